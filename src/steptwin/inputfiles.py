@@ -50,10 +50,10 @@ TOO_MANY_VALUES = Message(
 NO_TEXT = Message("inputfiles.no-text", "cannot read {path}: it is not UTF-8 text")
 
 
-def read_recorded(path: Path) -> str:
+def read_recorded(path: Path, most: int = MOST_RECORDED_BYTES) -> str:
     """The text of a recording or transcript (JSON in UTF-8), which may be parsed: its size and its number of values are bounded.
     Raises `Misuse`."""
-    data = read_bytes(path, MOST_RECORDED_BYTES)
+    data = read_bytes(path, most)
     values = sum(map(data.count, (b",", b"[", b"{")))
     if values > MOST_RECORDED_VALUES:
         raise Misuse(TOO_MANY_VALUES(path=path, values=values, most=MOST_RECORDED_VALUES))

@@ -61,6 +61,15 @@ class Later(Generic[T]):
         return self.result()
 
 
+def finish(parts: Generator[object, None, T]) -> T:
+    """The result of something that is done in parts, after all of them."""
+    while True:
+        try:
+            next(parts)
+        except StopIteration as end:
+            return end.value
+
+
 def start(work: Coroutine[Later[Any], None, T]) -> Later[T]:
     """Run a coroutine until it waits; it continues when that result is done. It may wait for `Later` only."""
     later: Later[T] = Later()

@@ -1,4 +1,4 @@
-import { mount } from "svelte";
+import { mount, unmount } from "svelte";
 import App from "./App.svelte";
 import "./app.css";
 import "./fonts.css";
@@ -10,6 +10,13 @@ import { restoreLanguage } from "./text";
 export function start(backend: Backend): void {
   restoreLanguage();
   restoreTheme();
+  const begin = () => mount(App, { target: document.getElementById("app") as HTMLElement, props: { backend } });
   // The page is not blocked by all of it at once.
-  setTimeout(() => mount(App, { target: document.getElementById("app") as HTMLElement, props: { backend } }));
+  setTimeout(() => {
+    let app = begin();
+    backend.swapped(() => {
+      void unmount(app);
+      app = begin();
+    });
+  });
 }

@@ -16,6 +16,7 @@ from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.files import recording as recordings
+from steptwin.inpage import recordings as recordings_of_page
 from steptwin.inpage.editor import PageEditor
 from steptwin.inpage.host import PageTwin, open_twin
 from steptwin.inpage.recordings import INPUTS_AT_ONCE
@@ -48,6 +49,8 @@ class Page:
         self.refusals: list[str] = []
         self.downloads: list[tuple[str, str]] = []
         self.kept = b""
+        self.number = 1
+        """Of its connection."""
         self._id = 0
 
     def opened(self, number: int) -> None:
@@ -67,6 +70,13 @@ class Page:
     def keep(self, state: bytes) -> None:
         self.kept = state
 
+    def swapped(self) -> None:
+        """It connects again."""
+        assert self.twin is not None
+        self.twin.connections.close(self.number)
+        self.number += 1
+        self.twin.connections.open(self.number)
+
     def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
         self.downloads.append((file, text))
 
@@ -76,23 +86,40 @@ class Page:
     def failed(self, text: str) -> None:
         self.errors.append(text)
 
-    async def enter(self, number: int = 1) -> None:
+    async def enter(self) -> Any:
+        """The whole state."""
         assert self.twin is not None
-        self.twin.connections.open(number)
-        await self.ask("hello", number, version=VERSION, kinds=["plan", "status"])
+        self.twin.connections.open(self.number)
+        return await self.greet()
 
-    async def ask(self, name: str, number: int = 1, /, **fields: object) -> Any:
-        answer = await self.answer(name, number, **fields)
+    async def greet(self) -> Any:
+        self.messages.clear()
+        await self.ask("hello", version=VERSION, kinds=["plan", "status"])
+        return next(one["hello"] for one in self.messages if "hello" in one)
+
+    async def swap(self, name: str, /, **fields: object) -> Any:
+        """The state of the world that is shown after a request."""
+        assert self.twin is not None
+        before = self.number
+        self.twin.connections.receive(before, json.dumps({"do": name, **fields}))
+        for _ in range(300):
+            await asyncio.sleep(0.01)
+            if self.number > before:
+                return await self.greet()
+        raise AssertionError(f"{name} has shown no other world: {self.messages[-1]}")
+
+    async def ask(self, name: str, /, **fields: object) -> Any:
+        answer = await self.answer(name, **fields)
         assert "error" not in answer, answer
         return answer["ok"]
 
     async def refusal(self, name: str, /, **fields: object) -> Any:
-        return (await self.answer(name, 1, **fields))["error"]
+        return (await self.answer(name, **fields))["error"]
 
-    async def answer(self, name: str, number: int, /, **fields: object) -> Any:
+    async def answer(self, name: str, /, **fields: object) -> Any:
         assert self.twin is not None
         self._id = asked = self._id + 1
-        self.twin.connections.receive(number, json.dumps({"do": name, "id": asked, **fields}))
+        self.twin.connections.receive(self.number, json.dumps({"do": name, "id": asked, **fields}))
         for _ in range(100):
             await asyncio.sleep(0.01)
             for one in self.messages:
@@ -118,7 +145,7 @@ def test_a_viewer_enters_moves_an_axis_and_leaves_while_the_world_goes_on() -> N
         assert hello["role"] == "engineer"
         assert hello["device_kinds"] == []
         # What needs a service, files or processes is not offered.
-        missing = {"connect", "ports", "scan", "end_points", "view_recording", "branches", "gateways", "campaigns", "history"}
+        missing = {"connect", "ports", "scan", "end_points", "leave_world", "gateways", "campaigns", "history"}
         assert missing & set(hello["may"]) == set()
         assert {"move", "fault", "show_moment", "why", "breakpoint", "download", "resume", "save_recording"} <= set(hello["may"])
         await page.ask("enable", controller="table", axis=1, on=True)
@@ -268,6 +295,133 @@ def test_a_recording_becomes_a_download_while_a_stop_comes_between_its_parts(tmp
         assert (await page.refusal("save_recording", name="../mine"))["code"] == "misuse"
         assert (await page.refusal("save", file="/mine.json"))["message"].startswith("no folder for recordings here")
         assert twin.world.keeps_inputs
+
+    run_virtually(visit())
+
+
+PROGRAM_OF_A_BRANCH = b"$R4 = 0\nDELAY 2\nIF IN3 = ON\n$R4 = 2\nELSE\n$R4 = 1\nENDIF\n"
+
+
+def test_a_branch_is_shown_in_place_of_the_machine_which_stands_until_it_is_left() -> None:
+    async def visit() -> None:
+        page = Page()
+        text = '[world]\nname = "hall"\n[[mic488]]\nname = "table"\nprogram = "a.prg"\nstart = true\n'
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        page.twin = twin = PageTwin(page, "hall", text, {"a.prg": PROGRAM_OF_A_BRANCH}, lambda: loop.now_ns)
+        twin.begin()
+        await page.enter()
+        await asyncio.sleep(5)
+        begun = await page.ask("start_branch", at_ns=str(SECOND))
+        assert begun == {"branch": 1, "from_ns": str(SECOND), "url": None}
+        assert await page.ask("branches") == [begun]
+        assert (await page.refusal("show_branch", branch=2))["message"] == "no branch 2: open are 1"
+
+        shown = await page.swap("show_branch", branch=1)
+        assert shown["description"]["name"] == "hall, branch 1 from 1.000 s"
+        assert (shown["time_ns"], shown["pace"]["running"]) == (str(SECOND), False)
+        assert "leave_world" in shown["may"]
+        assert {"recordings", "view_recording"} & set(shown["may"]) == set()
+        stood = twin.world.now
+        await page.ask("set", levels={"table.IN3": 1})
+        await page.ask("resume", speed=20)
+        await asyncio.sleep(1)
+        assert (await page.ask("read", points=["table.USER_REGISTER[4]:real"]))[0]["value"] == 2
+        assert twin.world.now == stood
+
+        # Branches of a branch; all of them share a limit.
+        for _ in range(3):
+            await page.ask("start_branch")
+        assert "the limit is 4" in (await page.refusal("start_branch"))["message"]
+        back = await page.swap("leave_world")
+        assert (back["description"]["name"], back["pace"]["running"]) == ("hall", True)
+        assert (await page.ask("read", points=["table.USER_REGISTER[4]:real"]))[0]["value"] == 1
+        await asyncio.sleep(1)
+        assert twin.world.now > stood
+        assert await page.ask("branches") == [begun]
+
+        # It is as it was left, and ends with its own branches.
+        again = await page.swap("show_branch", branch=1)
+        assert again["pace"] == {"running": True, "speed": 20}
+        await page.swap("leave_world")
+        await page.ask("end_branch", branch=1)
+        assert await page.ask("branches") == []
+        await page.ask("start_branch")
+        assert page.errors == []
+
+    run_virtually(visit())
+
+
+def test_a_chosen_recording_is_shown_as_it_was_in_place_of_the_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        await page.ask("enable", controller="table", axis=1, on=True)
+        await page.ask("move", controller="table", axis=1, to=20.0)
+        await asyncio.sleep(5)
+        await page.ask("save_recording", name="mine")
+        ((file, text),) = page.downloads
+        until = json.loads(text)["until_ns"]
+        await page.ask("move", controller="table", axis=1, to=0.0)
+        await asyncio.sleep(5)
+
+        (tmp_path / file).write_text(text)
+        shown = await page.swap("view_recording", name="mine")
+        assert (shown["time_ns"], shown["pace"]["running"], shown["role"]) == (str(until), False, "viewer")
+        assert (await page.ask("read", points=["table.M1.position"]))[0]["value"] == 20.0
+        assert {"move", "resume", "start_branch", "view_recording"} & set(shown["may"]) == set()
+        await page.ask("show_moment", to_ns=str(SECOND // 2))
+        assert 0 < (await page.ask("read", points=["table.M1.position"]))[0]["value"] < 20.0
+        await page.swap("leave_world")
+        assert (await page.ask("read", points=["table.M1.position"]))[0]["value"] == 0.0
+
+        # One whose replay is another run says so among its events.
+        changed = json.loads(text)
+        changed["inputs"] = changed["inputs"][:1]
+        (tmp_path / file).write_text(json.dumps(changed))
+        shown = await page.swap("view_recording", name="mine")
+        assert "the replay differs from the run recorded" in json.dumps(shown["events"])
+        await page.swap("leave_world")
+        assert twin.world.keeps_inputs
+        assert page.errors == []
+
+    run_virtually(visit())
+    assert list(tmp_path.iterdir()) == []  # it is in memory once
+
+
+HOSTILE = {
+    "x" * (recordings_of_page.MOST_BYTES + 1): "permitted are at most 8388608",
+    "[" * 1_600_000: "permitted are at most 1500000",
+    '{"a":' * 50_000: "mine.json is not a recording of a world",
+    "no JSON": "mine.json is not a recording of a world",
+    "{}": "mine.json is not a recording of a world: 'steptwin_session' is missing",
+    '{"steptwin_session": 99}': "mine.json is a recording of format 99: this version reads 1",
+}
+
+
+def test_a_file_that_is_no_recording_is_refused_with_its_name_and_the_machine_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        for text, words in HOSTILE.items():
+            (tmp_path / "mine.json").write_text(text)
+            error = await page.refusal("view_recording", name="mine")
+            assert words in error["message"], words
+            assert error["code"] == "misuse"
+        assert (await page.refusal("view_recording", name="../mine"))["code"] == "misuse"
+        assert "cannot read" in (await page.refusal("view_recording", name="mine"))["message"]
+        before = twin.world.now
+        await asyncio.sleep(1)
+        assert twin.world.now > before
+        assert page.errors == []
 
     run_virtually(visit())
 

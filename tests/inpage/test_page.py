@@ -243,7 +243,7 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     button(page, "To the present").click()
 
 
-def test_the_recording_is_a_download_that_a_computer_replays_and_answers_why_from(demo: Demo, tmp_path: Path) -> None:
+def test_the_recording_is_a_download_that_a_computer_replays_and_the_page_shows(demo: Demo, tmp_path: Path) -> None:
     page = demo.page
     expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
     show(page, "Recordings")
@@ -258,6 +258,44 @@ def test_the_recording_is_a_download_that_a_computer_replays_and_answers_why_fro
     assert "the same, digest" in replayed.stdout
     asked = subprocess.run([STEPTWIN, "why", str(path), "table.M1.position"], capture_output=True, text=True, check=True)
     assert "table.M1.position" in asked.stdout
+
+    # It is shown in place of the machine, at its end, and nothing of it can be changed.
+    chooser = page.get_by_label("View a recording…")
+    chooser.set_input_files(FilePayload(name="wrong.json", mimeType="", buffer=b"no JSON"))
+    expect(page.get_by_role("alert").last).to_contain_text("wrong.json is not a recording of a world")
+    until_ns = json.loads(path.read_text())["until_ns"]
+    chooser.set_input_files(path)
+    expect(page.get_by_role("banner").get_by_text("Recording", exact=True)).to_be_visible()
+    expect(time_of(page)).to_contain_text(re.compile(rf"paused.*{until_ns / 1e9:.3f}"[:-1], re.DOTALL))
+    show(page, "Axes")
+    expect(button(page, "Enable M1")).to_be_disabled()
+    page.locator("body").press(",")
+    expect(page.get_by_role("group", name="The past")).to_be_visible()
+    button(page, "Back").click()
+    expect(time_of(page)).to_contain_text("live")
+    expect(button(page, "Enable M1")).to_be_enabled()
+
+
+def test_a_branch_is_shown_in_place_of_the_machine(demo: Demo) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Time")
+    button(page, "Branch from now").click()
+    button(page, "Show branch 1").click()
+    branch = page.get_by_role("banner").get_by_text(re.compile(r"Branch 1 from \d+\.\d+ s"))
+    expect(branch).to_be_visible()
+    expect(time_of(page)).to_contain_text("paused")
+    show(page, "Time")
+    expect(page.get_by_role("list", name="Where this world comes from").get_by_role("listitem")).to_have_count(2)
+    stood = page.get_by_label("World time").inner_text()
+    button(page, "Step by a duration").click()
+    expect(page.get_by_label("World time")).not_to_have_text(stood)
+    button(page, "Back").click()
+    expect(branch).to_have_count(0)
+    expect(time_of(page)).to_contain_text("live")
+    show(page, "Time")
+    button(page, "End branch 1").click()
+    expect(button(page, "Show branch 1")).to_have_count(0)
 
 
 def test_the_panels_ask_the_twin_as_a_master_and_a_terminal_do(demo: Demo) -> None:
@@ -291,7 +329,10 @@ def test_a_breakpoint_stops_the_world_and_a_browser_without_room_is_named(demo: 
     show(page, "Program")
     page.get_by_label("Text", exact=True).select_option("steptwin:///table/program-0.prg")
     text = page.get_by_role("textbox", name="Text of demo.prg")
-    page.evaluate("() => { Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); }; }")
+    page.evaluate("""() => {
+      window.setItem = Storage.prototype.setItem;
+      Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); };
+    }""")
     text.click()
     page.keyboard.press("Control+Home")
     page.keyboard.insert_text("// no room\n")
@@ -299,6 +340,7 @@ def test_a_breakpoint_stops_the_world_and_a_browser_without_room_is_named(demo: 
     button(page, "As in the twin").click()
     expect(text).not_to_contain_text("no room")
     expect(page.get_by_text("The browser has no room for this text")).to_have_count(0)
+    page.evaluate("() => { Storage.prototype.setItem = setItem; }")
     expect(text.locator("span[class^=tok-]").first).to_be_visible(timeout=LOADING_MS)
 
     line = text.get_by_text("infeed = OFF")
@@ -353,8 +395,7 @@ def test_a_hidden_tab_goes_on_or_pauses_as_chosen(demo: Demo) -> None:
     page.evaluate(HIDE, True)
     expect(time_of(page)).to_contain_text("paused")
     page.evaluate(HIDE, False)
-    expect(time_of(page)).to_contain_text("live")
-    choice.uncheck()
+    expect(time_of(page)).to_contain_text("live")  # the choice is kept: other tabs have it
 
 
 def until(page: Page, condition: Callable[[], bool], what: str) -> None:
@@ -436,6 +477,10 @@ def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo, mon
     button(other, "Open in the studio").click()
     expect(time_of(other)).to_contain_text("live", timeout=LOADING_MS)
     expect(time_of(other)).to_contain_text(re.compile(r"[3-9]\.\d+ s"))
+    show(other, "Time")
+    choice = other.get_by_label("Pause while this tab is hidden")
+    expect(choice).to_be_checked()
+    choice.uncheck()
     button(other, "Pause time").click()
     expect(time_of(other)).to_contain_text("paused")
     expect(time_of(demo.page)).to_contain_text("live")

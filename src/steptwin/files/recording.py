@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from textwrap import indent
@@ -20,7 +20,8 @@ from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import FailedSave, World
-from steptwin.inputfiles import read_recorded
+from steptwin.inputfiles import MOST_RECORDED_BYTES, read_recorded
+from steptwin.later import finish
 from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
@@ -180,12 +181,17 @@ RECORDING_OF_ANOTHER_FORMAT = Message(
 
 def load(path: Path | str) -> Recording:
     """Read a recording. Raises `Misuse` for a file that cannot be read or is not a recording."""
-    content = read_recorded(Path(path))
+    return finish(loading(path))
+
+
+def loading(path: Path | str, most: int = MOST_RECORDED_BYTES) -> Generator[None, None, Recording]:
+    """As `load`, in parts, a file of at most ``most`` bytes."""
+    content = read_recorded(Path(path), most)
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)
         if data["steptwin_session"] != FORMAT:
             raise Misuse(RECORDING_OF_ANOTHER_FORMAT(path=path, format=data["steptwin_session"], own=FORMAT))
-        return _recording(data)
+        return (yield from _recording(data))
     except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
         raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a recording of a world: {_why(error)}") from None
 
@@ -206,12 +212,15 @@ def _why(error: Exception) -> str:
     return "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
 
 
-def _recording(data: Mapping[str, Any]) -> Recording:
+def _recording(data: Mapping[str, Any]) -> Generator[None, None, Recording]:
     """Raises `LookupError`, `TypeError` and `ValueError` for what is not a recording."""
     until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LONGEST_NS:
         raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")
-    inputs = tuple(_input(fitting("an input", item, dict)) for item in fitting("inputs", data["inputs"], list))
+    inputs: list[RecordedInput] = []
+    for item in fitting("inputs", data["inputs"], list):
+        inputs.append(_input(fitting("an input", item, dict)))
+        yield
     times = [given.time for given in inputs]
     if times != sorted(times) or (times and times[0] < 0):
         raise ValueError("the moments of the inputs are not in order")
@@ -224,7 +233,7 @@ def _recording(data: Mapping[str, Any]) -> Recording:
             for name, firmware in fitting("firmware", data["firmware"], dict).items()
         },
         fitting("seed", data["seed"], int),
-        inputs,
+        tuple(inputs),
         until,
         fitting("digest", data["digest"], str),
         fitting("overrides", data.get("overrides", {}), dict),

@@ -26,6 +26,10 @@ class Page(Protocol):
         """A state from which a twin can go on that takes the place of this one."""
         ...
 
+    def swapped(self) -> None:
+        """Another world is shown: what the page knows is of the one before."""
+        ...
+
     def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
         """A download of the browser."""
         ...

@@ -1,4 +1,4 @@
-"""The twin's worker of a page: a world and its studio, in one event loop, without sockets, threads and files."""
+"""The twin's worker of a page: worlds and their studios, in one event loop, without sockets, threads and files."""
 
 from __future__ import annotations
 
@@ -10,39 +10,38 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
-from steptwin import __version__
-from steptwin.access.audit import Audit
 from steptwin.access.roles import Role
-from steptwin.access.tokens import AccessGate
-from steptwin.controller import MILLISECOND, Nanos
-from steptwin.errors import Misuse
-from steptwin.files.auditfile import wall_clock
+from steptwin.controller import Nanos
+from steptwin.devices.composite import CompositeSubject
+from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.inpage.connections import Connections, Page, report
+from steptwin.inpage.branches import PageBranches
+from steptwin.inpage.connections import Connections, Page
 from steptwin.inpage.linked import LinkedTexts
+from steptwin.inpage.pagestudio import PageStudio
 from steptwin.inpage.recordings import PageRecordings
-from steptwin.live.clock import Clock
-from steptwin.live.pace import Pace
-from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.studio.shownworld import ShownWorld
-from steptwin.live.world import LiveWorld
-from steptwin.live.world_control import WorldControl
+from steptwin.live.studio.branched import without_past
+from steptwin.live.studio.recorded import Replayed
+from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.includes import given_files
-from steptwin.simulation.scheduler.trace import Mark
-from steptwin.studio.hub import Hub
+from steptwin.simulation.world.model import WORLD
 from steptwin.studio.surroundings import Connections as DeviceConnections
-from steptwin.studio.viewers import Viewers
+from steptwin.studio.viewers import AsgiReceive, AsgiScope, AsgiSend
+from steptwin.subject.payloads import StatusPayload
 
-SLICE_NS: Nanos = 20 * MILLISECOND
-"""Longest real time for which the world advances at once: a stop waits no longer for it."""
 KEPT_S = 1.0
 """A state is given to the page so often, in real time."""
+NOT_BESIDE_DEVICES = Message(
+    "inpage.not-beside-devices",
+    "another world cannot be shown while devices are connected: Stop all would not reach them from there. Disconnect them first",
+)
 
 
 class PageTwin:
-    """A world that goes on in a page. Everybody there is an engineer: nobody else reaches it."""
+    """The machine of a page, its branches, and a recording that is viewed: one of them is shown. Everybody is an engineer, for
+    nobody else reaches it; in a recording nothing can be changed."""
 
     def __init__(
         self,
@@ -57,65 +56,94 @@ class PageTwin:
         which it goes on instead, unrecorded, for its beginning is not known. Raises `WorldError` for a wrong description."""
         contents = {file: bytes(content) for file, content in files.items()}
         self.world = world = World.from_toml(text, contents, name=name) if kept is None else _world_at(name, kept)
-        world.trace.let_go()
         self._page = page
+        self._clock = clock
         self._text = text
         self._begins_at = 1.0 if kept is None else 0.0
-        self._stands_hidden = False
-        self._live = live = LiveWorld(world)
-        self._realtime = realtime = RealTimeDriver(live, Clock(wall_ns=clock, begin=world.now), SLICE_NS)
-        self.pace = Pace(live, realtime, live.show, has_clients=False)
-        shown = ShownWorld(live, realtime, self.pace, WorldControl(realtime, live, self.pace, None))
-        around = shown.surroundings(
-            gate=AccessGate(open_to=Role.ENGINEER),
-            audit=Audit(wall_clock),
-            program=__version__,
-            on_internal=partial(report, page),
-            recordings=PageRecordings(live, page, realtime.enter, self._leave),
-        )
-        self.subject = shown.subject
-        self.hub = Hub(shown.subject, shown.subject, around)
-        self.connections = Connections(Viewers(self.hub, clock).serve, page)
-        self.texts: Callable[[], Mapping[str, bytes]] = around.programs.files
-        """Texts of the programs at present, by address, for an editor server."""
-        self._linked = LinkedTexts(world.blueprint.files, around.programs)
+        self._machine = self._shown = machine = PageStudio(world, page, clock)
+        self.hub = machine.hub
+        self.subject: CompositeSubject = machine.subject
+        recordings = PageRecordings(machine, page, self._check_devices, self._view)
+        self.hub.around = replace(self.hub.around, recordings=recordings, recording_files=recordings)
+        self._offer_branches(machine)
+        self.connections = Connections(self._serve, page)
+        self._linked = LinkedTexts(world.blueprint.files, self.hub.around.programs)
+
+    async def _serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
+        await self._shown.serve(scope, receive, send)
+
+    def texts(self) -> Mapping[str, bytes]:
+        """Texts of the programs of what is shown, by address, for an editor server."""
+        return self._shown.texts()
 
     def link(self) -> str:
-        """Description and programs at present as JSON, as a link has them; ``refused`` is why it cannot have them."""
+        """Description and programs of the machine at present as JSON, as a link has them; ``refused``: why it has none."""
         try:
             return json.dumps({"description": self._text, "programs": self._linked.present()})
         except Misuse as error:
             return json.dumps({"refused": str(error)})
 
     def offer(self, connections: DeviceConnections) -> None:
-        """Devices can be connected from now on; viewers are told."""
+        """Devices can be connected to the machine from now on; viewers are told."""
         self.hub.around = replace(self.hub.around, connections=connections)
         self.hub.descriptions += 1
 
     def begin(self) -> None:
         """Time goes from now on; it stands at a state that was kept, for what came after it may happen again."""
-        self.pace.begin(self._begins_at)
+        self._machine.pace.begin(self._begins_at)
         self._keep()
 
     def hide(self, is_hidden: bool) -> None:
         """Stop time because the page is hidden; when it is seen again, time goes on if it went before."""
-        if is_hidden and not self.pace.is_paused:
-            self._stands_hidden = True
-            self.pace.pause()
-        elif not is_hidden and self._stands_hidden:
-            self._stands_hidden = False
-            self.pace.resume()
+        self._shown.hide(is_hidden)
+
+    # ------------------------------------------------------------------ worlds in place of the machine
+
+    def _offer_branches(self, studio: PageStudio) -> None:
+        branches = PageBranches(studio, partial(self._branch, studio), lambda: self._machine.opened)
+        studio.hub.around = replace(
+            studio.hub.around, branches=branches, show_branch=lambda number: self._show(branches.studio(number))
+        )
+
+    def _branch(self, above: PageStudio, world: World) -> PageStudio:
+        studio = PageStudio(world, self._page, self._clock)
+        self._offer_branches(studio)
+        studio.hub.around = replace(studio.hub.around, leave_world=lambda: self._show(above))
+        return studio
+
+    def _view(self, found: Replayed) -> None:
+        """Show a recording; it ends when it is left."""
+        world, snapshots, differs = found
+        above, studio = self._shown, PageStudio(world, self._page, self._clock, role=Role.VIEWER, snapshots=snapshots)
+        if differs:
+            studio.live.subject.publish(world.now, WORLD, StatusPayload("replay-differs", differs))
+
+        def leave() -> None:
+            self._show(above)
+            studio.end()
+
+        studio.hub.around = replace(studio.hub.around, leave_world=leave)
+        self._show(studio)
+
+    def _show(self, studio: PageStudio) -> None:
+        self._check_devices()
+        self._shown.hide(True)
+        self._shown = studio
+        studio.hide(False)
+        self._page.swapped()
+
+    def _check_devices(self) -> None:
+        """Raises `Refusal` where there are any."""
+        if self.subject.has_devices:
+            raise Refusal(NOT_BESIDE_DEVICES())
+
+    # ------------------------------------------------------------------ states for the page
 
     def _keep(self) -> None:
-        state = replace(self.world.snapshot(with_inputs=False), trace=Mark(()))  # as a branch begins: without a past
-        self._leave()
+        state = without_past(self.world.snapshot(with_inputs=False))
+        self._machine.leave()
         self._page.keep(pickle.dumps(state))
         asyncio.get_running_loop().call_later(KEPT_S, self._keep)
-
-    def _leave(self) -> None:
-        """The world has been looked at as a whole."""
-        self._live.is_dirty = True
-        self._realtime.leave()
 
 
 def _world_at(name: str, kept: bytes) -> World:

@@ -37,16 +37,14 @@ from steptwin.live.serving import check_name, shows_live_view
 from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
-from steptwin.live.world import ClientPort, LiveWorld, VisionPort, announced
+from steptwin.live.world import ClientPort, LiveWorld, VisionPort, announced, send_away
 from steptwin.live.world_control import WorldControl
 from steptwin.services import read_services
 from steptwin.simulation.kinds.kind import LinkKind
-from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.toml.addresses import check_addresses, parse_address
-from steptwin.simulation.world.inputs import Leave
 from steptwin.simulation.world.records import is_shown, named_in, read_selection
 from steptwin.tracing import is_traced
 
@@ -120,13 +118,6 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
         clear_ready_file(options.ready_file)
     asyncio.run(_serve(replace(options, live=replace(options.live, name=name)), world, past, kept, reports, addition))
     return not world.failures and not (options.run.strict and world.overdue)
-
-
-def send_away(world: World) -> None:
-    """Disconnect the clients of a continued recording: they are not connected now."""
-    for line in world.lines.values():
-        for client in [client for client in line.clients if client != SCRIPTS]:
-            world.apply_input(Leave(line.name, client))
 
 
 async def _serve(

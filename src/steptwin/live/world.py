@@ -15,7 +15,7 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
 from steptwin.messages import Message
-from steptwin.simulation.kinds.lines import LineEndPoint
+from steptwin.simulation.kinds.lines import SCRIPTS, LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -44,6 +44,13 @@ def announced(world: World) -> list[dict[str, object]]:
         axes = [{"unit": axis.unit, "pulses_per_unit": axis.pulses_per_unit} for axis in kind.datasheet(controller).axes]
         found.append({"name": name, "kind": kind.name, **where, "axes": axes})
     return found
+
+
+def send_away(world: World) -> None:
+    """Disconnect the clients of a recording or branch that goes on: they are not connected now."""
+    for line in world.lines.values():
+        for client in [client for client in line.clients if client != SCRIPTS]:
+            world.apply_input(Leave(line.name, client))
 
 
 class RecordedExtent(NamedTuple):

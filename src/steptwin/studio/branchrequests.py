@@ -1,4 +1,5 @@
-"""Requests for branches: worlds without ports that begin at a moment of the past of the world that is shown."""
+"""Requests for branches: worlds without ports that begin at a moment of the past of the world that is shown. A studio in a page
+shows them, and recordings, in place of that world."""
 
 from __future__ import annotations
 
@@ -19,7 +20,9 @@ class Branch:
 
     branch: int
     from_ns: Annotated[Moment, "Where it began. Virtual time, as decimal text [ns]"]
-    url: Annotated[str, "Of its page; the token there is the one of here."]
+    url: Annotated[
+        str | None, "Of its page; the token there is the one of here. null: show_branch shows it instead of this world."
+    ]
 
 
 class Branches(Protocol):
@@ -60,4 +63,21 @@ class EndBranch:
     branch: Annotated[int, Meaning("Its number.", whole(1, 2**53))]
 
 
+@request(
+    "show_branch",
+    KEEP,
+    "Show a branch in place of this world, whose time stands until it is shown again. Every viewer has to connect again.",
+)
+@dataclass(frozen=True, slots=True)
+class ShowBranch:
+    branch: Annotated[int, Meaning("Its number.", whole(1, 2**53))]
+
+
+@request("leave_world", LOOK, "Show the world again from which this branch was begun, or this recording opened.")
+@dataclass(frozen=True, slots=True)
+class LeaveWorld:
+    pass
+
+
+PlaceRequest: TypeAlias = ShowBranch | LeaveWorld
 BranchRequest: TypeAlias = ListBranches | StartBranch | EndBranch

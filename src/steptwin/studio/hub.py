@@ -111,6 +111,7 @@ NO_FOLDER_FOR_RECORDINGS = Message(
     "studio.no-folder-for-recordings", "no folder for recordings here: save_recording makes a download of the browser"
 )
 NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "no world to branch here: start the studio with the file of a world")
+NOT_IN_PLACE = Message("studio.not-in-place", "{request}: here no world is shown in place of another one")
 NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "no world to draw here: start the studio with the file of a world")
 NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "no world here, so no gateways and no history")
 NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "no campaigns here: start the studio with the file of a world")
@@ -194,6 +195,18 @@ class Hub:
             raise Refusal(NO_WORLD_TO_BRANCH())
         return self.around.branches
 
+    def show_branch(self, branch: int) -> None:
+        """Raises `Misuse`, and `Refusal` where it has a page of its own."""
+        if self.around.show_branch is None:
+            raise Refusal(NOT_IN_PLACE(request="show_branch"))
+        self.around.show_branch(branch)
+
+    def leave_world(self) -> None:
+        """Raises `Refusal` where no other world is to be shown."""
+        if self.around.leave_world is None:
+            raise Refusal(NOT_IN_PLACE(request="leave_world"))
+        self.around.leave_world()
+
     @property
     def arrangement(self) -> Arrangement:
         """Raises `Refusal` where there is no world."""
@@ -265,6 +278,8 @@ class Hub:
             (around.recordings, OF_RECORDINGS),
             (around.recording_files, OF_RECORDING_FILES),
             (around.branches, OF_BRANCHES),
+            (around.show_branch, frozenset({"show_branch"})),
+            (around.leave_world, frozenset({"leave_world"})),
             (around.arrangement, OF_DRAWINGS),
             (around.services, OF_SERVICES),
             (around.campaigns, OF_CAMPAIGNS),

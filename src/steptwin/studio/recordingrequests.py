@@ -65,6 +65,7 @@ class RecordingsOfWorld:
     folder: Annotated[str | None, "Where recordings are saved; null: each becomes a download of the browser."]
     saved: Annotated[tuple[RecordingFile, ...], "Sessions there, the newest first."]
     formats: Annotated[tuple[str, ...], "What GET /api/recordings/NAME.FORMAT makes of them."]
+    most_bytes: Annotated[int | None, "Of a file that is chosen on the page to be viewed; null: none is."] = None
 
 
 class Recordings(Protocol):
@@ -85,8 +86,8 @@ class RecordingFiles(Protocol):
         for a place outside of the folder of the world, `Refusal` for another file."""
         ...
 
-    async def view(self, name: str) -> str:
-        """The address of the page. Raises `Misuse`, `Refusal`."""
+    async def view(self, name: str) -> str | None:
+        """The address of the page; None where it is shown in place of the world. Raises `Misuse`, `Refusal`."""
         ...
 
     async def file(self, name: str) -> str:
@@ -116,13 +117,14 @@ class SaveRecording:
 class ViewAddress:
     """The address of a page."""
 
-    url: str
+    url: Annotated[str | None, "null: it is shown in place of the world."]
 
 
 @request(
     "view_recording",
     KEEP,
-    "Open a saved recording as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
+    "Open a saved recording as a page of its own, as steptwin studio FILE --view does; at a loopback address only. A studio in a "
+    "page shows one that was chosen there in place of its world.",
     ViewAddress,
 )
 @dataclass(frozen=True, slots=True)

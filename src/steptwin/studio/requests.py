@@ -22,7 +22,7 @@ from steptwin.jsonvalues import TEXT, JsonForm, Moment, list_of, members, shape
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
-from steptwin.studio.branchrequests import BranchRequest
+from steptwin.studio.branchrequests import BranchRequest, PlaceRequest
 from steptwin.studio.campaignrequests import CampaignRequest
 from steptwin.studio.devicerequests import DeviceRequest
 from steptwin.studio.drawingrequests import DrawingRequest
@@ -356,6 +356,7 @@ StudioRequest: TypeAlias = (
     | RecordingRequest
     | RecordingFileRequest
     | BranchRequest
+    | PlaceRequest
     | DrawingRequest
     | ServiceRequest
     | CampaignRequest

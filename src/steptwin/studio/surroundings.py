@@ -144,6 +144,10 @@ class Surroundings:
     """None where recordings are in no folder."""
     branches: Branches | None = None
     """None without a world."""
+    show_branch: Callable[[int], object] | None = None
+    """Shows a branch in place of the world; None where it has a page of its own. Raises `Misuse`, `Refusal`."""
+    leave_world: Callable[[], object] | None = None
+    """Shows the world again in whose place this one is; None where it is in no place of another one."""
     arrangement: Arrangement | None = None
     """None without a world."""
     models: ModelFiles | None = None

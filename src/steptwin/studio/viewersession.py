@@ -495,6 +495,8 @@ class ViewerSession:
             branch.ListBranches: lambda self, _: self._hub.branches.list(),
             branch.StartBranch: lambda self, wanted: self._hub.branches.start(wanted.moment),
             branch.EndBranch: lambda self, wanted: self._hub.branches.end(wanted.branch),
+            branch.ShowBranch: lambda self, wanted: self._hub.show_branch(wanted.branch),
+            branch.LeaveWorld: lambda self, _: self._hub.leave_world(),
             services.ReadGateways: lambda self, _: self._hub.services.gateways(),
             services.ReadHistory: lambda self, _: self._hub.services.history(),
             services.ReadHistoryValues: lambda self, one: self._hub.services.values(one.points, one.run, one.from_s, one.to_s),

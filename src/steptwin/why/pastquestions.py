@@ -300,8 +300,8 @@ class PastQuestions:
         return _Known(self._snapshots, state, self._most, self._lacking, self._causes_of)
 
     def _note_near(self, moment: Nanos) -> Generator[None, None, _Known]:
-        """A log from a moment on, to which the past is run again from the newest state before it: where time has gone fast that may
-        be so long before that there would be too much to note."""
+        """A log from a moment on, to which the past is run again from the newest state before it: where time has gone fast that
+        may be so long before that there would be too much to note."""
         state, number = self._snapshots.state_at(moment), 0
         if moment - state.snapshot.now > FURTHER * FIRST_SPAN_NS:
             world = second_world(self._snapshots.world, state.snapshot)

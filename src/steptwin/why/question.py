@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
+from steptwin.later import finish
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
@@ -34,15 +35,6 @@ MOST_SNAPSHOTS = 5
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
-
-
-def finish(asking: Asking) -> Answer:
-    """The answer, after all parts."""
-    while True:
-        try:
-            next(asking)
-        except StopIteration as end:
-            return end.value
 
 
 def _led_to(effect: Cause) -> Cause | None:

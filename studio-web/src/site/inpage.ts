@@ -34,8 +34,9 @@ class PythonWorker {
     root: URL,
     task: Promise<Task>,
     private readonly loading: (loading: Loading) => void,
+    private readonly swapped: () => void = () => undefined,
   ) {
-    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.received(data);
     this.worker.onerror = ({ message }) => this.fail(message);
     task.then(
       (start) => this.tell({ start, root: root.href }),
@@ -74,11 +75,11 @@ class PythonWorker {
     return new Promise((done, failed) => this.offered.push({ done, failed }));
   }
 
-  /** Gives the name of a configuration file in addresses, which have commas between their options. */
-  async configure(file: File): Promise<string> {
-    const config = `${file.name.replace(/\.cfg$/i, "").replace(/[^\w-]/g, "_")}.cfg`;
-    this.tell({ config, content: new Uint8Array(await file.arrayBuffer()) });
-    return config;
+  /** Gives its name from now on. Addresses have commas between their options. */
+  async take(file: File): Promise<string> {
+    const given = file.name.replace(/[^\w.-]|^[.-]/g, "_");
+    this.tell({ given, content: new Uint8Array(await file.arrayBuffer()) });
+    return given;
   }
 
   /** All that is connected to it has lost its connection, and gets no other one. */
@@ -100,7 +101,7 @@ class PythonWorker {
     this.end();
   }
 
-  private take(message: FromWorker): void {
+  private received(message: FromWorker): void {
     if ("port" in message) this.ports.take(message);
     else if ("messages" in message) {
       this.links.get(message.on)?.messages(message.messages);
@@ -118,6 +119,7 @@ class PythonWorker {
       else waiting?.done(message.address);
     } else if ("file" in message) save(new Blob([message.text], { type: "application/json" }), message.file);
     else if ("kept" in message) this.kept = message.kept;
+    else if ("swapped" in message) this.swapped();
     else if ("progress" in message) this.loading({ phase: message.progress });
     else this.fail(message.failed);
   }
@@ -128,7 +130,9 @@ export class InPage implements Backend {
   readonly origin = Offline;
   private twin: PythonWorker;
   private editor: PythonWorker | null = null;
-  private tellLoading: (loading: Loading) => void = () => undefined;
+  private tellLoading: ((loading: Loading) => void) | null = null;
+  private isOther = false;
+  private tellSwapped: () => void = () => undefined;
 
   /** `root`: where the page is; `name`: of its world, where no link gives another one. */
   constructor(
@@ -144,21 +148,42 @@ export class InPage implements Backend {
 
   /** `kept`: a state of a twin that has ended, from which this one goes on. */
   private start(kept?: Uint8Array): PythonWorker {
-    return new PythonWorker(this.root, this.task(kept), (loading) => {
-      if ("phase" in loading) performance.mark(loading.phase);
-      this.tellLoading(loading);
-    });
+    return new PythonWorker(
+      this.root,
+      this.task(kept),
+      (loading) => {
+        if ("phase" in loading) performance.mark(loading.phase);
+        this.tellLoading?.(loading);
+      },
+      () => this.swap(true),
+    );
   }
 
   follow(listener: (loading: Loading) => void): void {
+    const isLoaded = this.tellLoading !== null;
     this.tellLoading = listener;
+    if (isLoaded) return;
     listener({ phase: "python" }); // before the worker says so: until then nothing can be asked
     if (this.linked !== null) return; // its state comes from the twin
     this.get(`${this.name}.hello.json`).then(
-      async (response) => this.tellLoading({ foreseen: (await response.json()) as Hello }),
+      async (response) => this.tellLoading?.({ foreseen: (await response.json()) as Hello }),
       () => undefined, // it will come from the twin
     );
   }
+
+  /** `isOther`: whether a world is shown in place of the machine, or was. */
+  private swap(isOther: boolean): void {
+    this.isOther = isOther;
+    this.editor?.end(); // it has the texts of the world before
+    this.editor = null;
+    this.tellSwapped();
+  }
+
+  swapped(listener: () => void): void {
+    this.tellSwapped = listener;
+  }
+
+  take = (file: File) => this.twin.take(file);
 
   open: OpenLink = (path, events) => {
     if (path === "/ws") return this.twin.open(events);
@@ -187,7 +212,6 @@ export class InPage implements Backend {
   readonly serial = {
     problem: SerialPorts.problem,
     choose: () => this.twin.choosePort(),
-    configure: (file: File) => this.twin.configure(file),
   };
 
   /** The tab is not hidden while somebody chooses. */
@@ -201,8 +225,9 @@ export class InPage implements Backend {
 
   restart(): void {
     const ended = this.twin;
-    this.tellLoading({ phase: "python" });
     this.twin = this.start(ended.kept);
+    if (this.isOther) this.swap(false);
+    this.tellLoading?.({ phase: "python" });
     ended.end();
   }
 

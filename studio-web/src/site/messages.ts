@@ -26,8 +26,8 @@ export type ToWorker =
   | ToPort
   /** A port that the user has chosen, by its number. */
   | { offer: number; what: string }
-  /** A file that the user has chosen, by the name that addresses have for it. */
-  | { config: string; content: Uint8Array }
+  /** A file that the user has chosen, and its name from now on. */
+  | { given: string; content: Uint8Array }
   | { start: Task; root: string }
   | { open: number }
   | { send: string; on: number }
@@ -48,6 +48,8 @@ export type FromWorker =
   | { opened: number }
   | { messages: unknown[]; on: number }
   | { closed: number; code: number }
+  /** Another world is shown. */
+  | { swapped: true }
   /** The present texts of the twin by address. */
   | { texts: Texts }
   /** JSON of `PageTwin.link`. */

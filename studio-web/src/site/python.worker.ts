@@ -77,6 +77,7 @@ const page = {
     tell({ port, write: data.toJs() as Uint8Array<ArrayBuffer>, at: Date.now() }),
   closePort: (port: number) => tell({ port, close: true }),
   saveText: (file: string, text: string) => tell({ file, text }),
+  swapped: () => tell({ swapped: true }),
   keep: (state: PyProxy) => tell({ kept: state.toJs() as Uint8Array }),
   refused: (text: string) => tell({ failed: text }),
   failed: (text: string) => console.error(text),
@@ -171,7 +172,7 @@ function take(host: Twin | Editor, message: ToWorker): void {
   if ("port" in message) {
     if (ports !== null) takeFromPort(ports, message);
   } else if ("offer" in message) offer(message.offer, message.what);
-  else if ("config" in message) python?.FS.writeFile(message.config, message.content);
+  else if ("given" in message) python?.FS.writeFile(message.given, message.content);
   else if ("open" in message) {
     outgoing.set(message.open, new Outgoing(message.open));
     connections.open(message.open);

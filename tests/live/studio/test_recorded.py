@@ -11,7 +11,8 @@ from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
-from steptwin.live.studio.recorded import recorded
+from steptwin.later import finish
+from steptwin.live.studio.recorded import replayed
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.snapshotlog import PastWorld
 
@@ -40,9 +41,8 @@ def make(path: Path) -> dict[int, tuple[float, ...]]:
 def test_every_moment_of_a_session_can_be_looked_at(tmp_path: Path) -> None:
     path = tmp_path / "s.json"
     seen = make(path)
-    warned: list[str] = []
-    world, snapshots = recorded(path, warned.append)
-    assert warned == []
+    world, snapshots, differs = finish(replayed(path))
+    assert differs == ""
     assert (world.now, snapshots.begin) == (10 * SECOND, 0)
     assert len(snapshots) == 11
     past = PastWorld(snapshots)
@@ -58,12 +58,10 @@ def test_a_session_that_ran_otherwise_is_shown_with_a_warning(tmp_path: Path) ->
     data = json.loads(path.read_text())
     del data["inputs"][1]  # IN3 = 1
     path.write_text(json.dumps(data))
-    warned: list[str] = []
-    recorded(path, warned.append)
-    assert len(warned) == 1
-    assert "differs from the run recorded" in warned[0]
+    _, _, differs = finish(replayed(path))
+    assert "differs from the run recorded" in differs
 
 
 def test_a_description_is_no_recording() -> None:
     with pytest.raises(Misuse, match=r"machine\.toml: --view shows a recording"):
-        recorded(Path("machine.toml"), print)
+        finish(replayed(Path("machine.toml")))

@@ -5,37 +5,33 @@ from __future__ import annotations
 import asyncio
 import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
-from steptwin.controller import MILLISECOND, Nanos
-from steptwin.errors import Misuse, Refusal
+from steptwin.controller import Nanos
+from steptwin.errors import Refusal
 from steptwin.eventloop import later
 from steptwin.live.realtimedriver import RealTimeDriver
+from steptwin.live.studio.branched import MOST_BRANCHES, TOO_MANY_BRANCHES, BranchPoint, BranchState, unknown_branch
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.processes import ChildProcesses, Process
 from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.world import LiveWorld
-from steptwin.messages import NONE, Message
-from steptwin.simulation.scheduler.trace import Mark
-from steptwin.simulation.world.snapshot import SimulationSnapshot
+from steptwin.messages import Message
 from steptwin.studio.branchrequests import Branch
 
-MOST_BRANCHES = 4
 MODULE = "steptwin.live.studio.branch"
 
 
 @dataclass(frozen=True, slots=True)
 class BranchStart:
-    """Start of a branch, which its process reads from its standard input, pickled. ``source`` is the name of the description."""
+    """Start of a branch, which its process reads from its standard input, pickled."""
 
     own: StudioOptions
     ready_file: Path
-    name: str
-    source: str
-    snapshot: SimulationSnapshot
+    state: BranchState
 
 
 class _OpenBranch(NamedTuple):
@@ -47,9 +43,7 @@ BRANCH_FROM_ELSEWHERE = Message(
     "live.branch-from-elsewhere",
     "a branch is reached from the computer of the studio only: there is none while others can reach it",
 )
-TOO_MANY_BRANCHES = Message("live.too-many-branches", "too many branches: the limit is {most}; end one")
 BRANCH = Message("live.branch", "branch {number}")
-UNKNOWN_BRANCH = Message("live.unknown-branch", "no branch {branch}: open are {names}")
 
 
 class WorldBranches:
@@ -59,9 +53,7 @@ class WorldBranches:
     def __init__(
         self, live: LiveWorld, realtime: RealTimeDriver, time_travel: WorldTimeTravel, own: StudioOptions | None
     ) -> None:
-        self._live = live
-        self._realtime = realtime
-        self._time_travel = time_travel
+        self._point = BranchPoint(live, realtime, time_travel)
         self._own = own
         self._processes = ChildProcesses()
         self._open: dict[int, _OpenBranch] = {}
@@ -83,27 +75,25 @@ class WorldBranches:
             raise Refusal(TOO_MANY_BRANCHES(most=MOST_BRANCHES))
         self._starting += 1
         try:
-            self._realtime.enter()
-            snapshot = await self._time_travel.state_at(self._live.now if moment is None else moment)
             number = next(self._numbers)
-            branch = await later(asyncio.to_thread(self._begin, self._own, number, snapshot))
+            state = await self._point.state(number, moment)
+            branch = await later(asyncio.to_thread(self._begin, self._own, number, state))
         finally:
             self._starting -= 1
         self._open[number] = branch
         return branch.shown
 
-    def _begin(self, own: StudioOptions, number: int, snapshot: SimulationSnapshot) -> _OpenBranch:
-        """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""
-        spec, ready = self._live.world.spec, self._processes.folder / f"{number}.ready.json"
-        name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"
-        begun = BranchStart(own, ready, name, spec.text.source.name, replace(snapshot, inputs=(), trace=Mark(())))
-        process = self._processes.start(MODULE, given=pickle.dumps(begun))
-        return _OpenBranch(process, Branch(number, snapshot.now, self._processes.url(process, ready, BRANCH(number=number))))
+    def _begin(self, own: StudioOptions, number: int, state: BranchState) -> _OpenBranch:
+        """Blocks until its page is there."""
+        ready = self._processes.folder / f"{number}.ready.json"
+        process = self._processes.start(MODULE, given=pickle.dumps(BranchStart(own, ready, state)))
+        url = self._processes.url(process, ready, BRANCH(number=number))
+        return _OpenBranch(process, Branch(number, state.snapshot.now, url))
 
     async def end(self, branch: int) -> None:
         found = self._running().pop(branch, None)
         if found is None:
-            raise Misuse(UNKNOWN_BRANCH(branch=branch, names=list(self._open) or NONE()))
+            raise unknown_branch(branch, self._open)
         await later(asyncio.to_thread(self._processes.end, found.process))
 
     async def close(self) -> None:

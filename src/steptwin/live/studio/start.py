@@ -27,12 +27,12 @@ from steptwin.files.auditfile import AuditFile, wall_clock
 from steptwin.files.export.tracefile import read_kept
 from steptwin.files.loader import is_recording
 from steptwin.files.tokenfiles import tokens_in
-from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
+from steptwin.later import finish
 from steptwin.live.keptsettings import keep_settings, state_directory
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.ports import serial_ports, twin_ports
-from steptwin.live.running import Running, send_away, up, up_with
+from steptwin.live.running import Running, up, up_with
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
@@ -42,7 +42,7 @@ from steptwin.live.studio.models import models_of
 from steptwin.live.studio.openpage import DEFAULT, OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.owntokens import new_tokens, own_tokens
-from steptwin.live.studio.recorded import recorded
+from steptwin.live.studio.recorded import replayed
 from steptwin.live.studio.recordings import WorldRecordings
 from steptwin.live.studio.services import LiveServices
 from steptwin.live.studio.shownworld import ShownWorld
@@ -50,9 +50,6 @@ from steptwin.live.studio.work import LineWork
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
 from steptwin.messages import Message
-from steptwin.simulation.describe.blueprint import Blueprint
-from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
@@ -79,7 +76,9 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
         page = _Page(own, entrance, listening, audit)
         if own.view and options.world is not None:
-            world, snapshots = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
+            world, snapshots, differs = finish(replayed(options.world))
+            if differs:
+                sys.stderr.write(f"{differs}\n")
             stack.enter_context(world)
             opening = partial(page.open, beside=options, snapshots=snapshots)
             return up_with(world, replace(options, live=replace(options.live, speed="0"), is_closed=True), opening)
@@ -99,15 +98,11 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
 
 def studio_of_branch(start: BranchStart) -> None:
     """Show a branch, in which time stands at first. Raises as `studio`."""
-    text, seed, overrides, files = start.snapshot.description
-    spec = read_world(start.source, text, seed, overrides, given_files(files))
-    blueprint = Blueprint(replace(spec, name=start.name), files)
     entrance = _entrance(start.own)
     with (
         listen(entrance.address, is_fixed=True) as listening,
-        World(blueprint, keep_trace=False, keep_inputs=False, at=start.snapshot) as world,
+        start.state.world() as world,
     ):
-        send_away(world)
         page = _Page(start.own, entrance, listening, Audit(wall_clock))
         options = UpOptions(world=None, live=LiveOptions(speed="0"), ready_file=start.ready_file, is_closed=True)
         up_with(world, options, partial(page.open))

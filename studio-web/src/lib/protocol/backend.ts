@@ -28,8 +28,6 @@ export interface SerialPorts {
   readonly problem: string | null;
   /** Asks the user for one, on a click. Gives its address; null where the user does not want to. */
   choose(): Promise<string | null>;
-  /** Takes a file for the option `config` of addresses. Gives its name there. */
-  configure(file: File): Promise<string>;
 }
 
 export interface WhileHidden {
@@ -51,6 +49,10 @@ export interface Backend {
   share: (() => Promise<string>) | null;
   /** What the page shows of where it is from, beside Share; null where there is nothing. */
   origin: Component | null;
+  /** Takes a file that the user has chosen. Gives its name there: for `view_recording`, and for the option `config` of addresses. */
+  take: ((file: File) => Promise<string>) | null;
+  /** Called where another world is shown from now on, of which the page knows nothing; never where it cannot be. */
+  swapped(listener: () => void): void;
   /** Serial ports that only the browser can reach; null where the studio reaches them itself. */
   serial: SerialPorts | null;
   /** Ends the twin, even where it does not answer, and begins another one at its last state; null where the page does not own it. */

@@ -84,6 +84,7 @@ export class Connection {
   private attempts = 0;
   private watchdog = 0;
   private stateNow: ConnectionState = "connecting";
+  private hasEnded = false;
 
   constructor(
     private readonly greeting: () => Fields<"hello">,
@@ -98,6 +99,14 @@ export class Connection {
       messages: (messages) => this.received(messages),
       closed: (code) => this.closed(code),
     });
+  }
+
+  /** It is not opened again. */
+  close(): void {
+    this.timers.clear(this.watchdog);
+    this.isOpen = false;
+    this.hasEnded = true;
+    this.link?.close();
   }
 
   /** Greets the studio anew, such as with another token. */
@@ -154,6 +163,7 @@ export class Connection {
   }
 
   private closed(code: number): void {
+    if (this.hasEnded) return;
     this.isOpen = false;
     this.link = null;
     this.timers.clear(this.watchdog);
@@ -172,6 +182,7 @@ export class Connection {
   }
 
   private received(messages: readonly unknown[]): void {
+    if (this.hasEnded) return;
     this.watch();
     let news: Pushed[] = [];
     for (const message of messages as readonly (Answer | Pushed)[]) {

@@ -40,6 +40,8 @@ export const served: Backend = {
   origin: null,
   restart: null,
   hidden: null,
+  take: null,
+  swapped: () => undefined,
   serial: null,
   open,
   follow: () => undefined,

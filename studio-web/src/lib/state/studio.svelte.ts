@@ -155,6 +155,11 @@ export class Studio {
     this.connection.open();
   }
 
+  /** Nothing is shown of it any more. */
+  close(): void {
+    this.connection.close();
+  }
+
   /** Says hello again, with the token that the page has now. */
   renew(): void {
     this.connection.renew();

@@ -52,6 +52,9 @@ export const t = texts(
     branch: "Branch {number}",
     begins: "from {time} s",
     openBranch: "Open branch {number}",
+    showBranch: "Show branch {number}",
+    branchInPlace:
+      "A second world, shown in place of this one. This one stands until you come back. Nothing of a branch reaches it.",
     endBranch: "End branch {number}",
     end: "End",
     pastHelp:
@@ -109,6 +112,9 @@ export const t = texts(
     branch: "Odgałęzienie {number}",
     begins: "od {time} s",
     openBranch: "Otwórz odgałęzienie {number}",
+    showBranch: "Pokaż odgałęzienie {number}",
+    branchInPlace:
+      "Drugi świat, który widać zamiast tego. Ten stoi, póki nie wrócisz. Nic z odgałęzienia do niego nie dociera.",
     endBranch: "Zakończ odgałęzienie {number}",
     end: "Zakończ",
     pastHelp:
