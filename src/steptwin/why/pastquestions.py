@@ -23,7 +23,7 @@ from steptwin.why.lacking import Found, Lacking
 from steptwin.why.log import in_parts
 from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
-from steptwin.why.roots import SetFault
+from steptwin.why.roots import Root, SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.whynot import what_lacks
 from steptwin.why.without import NOT_TRIED, Trying, trying_without
@@ -160,8 +160,8 @@ class PastQuestions:
         around = 0 if self._is_near(name, answers[0]) else STANDS_NS
         return (yield from self._trying(link, answers, around))
 
-    def _trying(self, link: ChainLink, answers: Sequence[Answer], around: Nanos = 0) -> Trying:
-        trying = trying_without(self._snapshots, link, answers, self._most, around=around)
+    def _trying(self, link: ChainLink, answers: Sequence[Answer], around: Nanos = 0, others: Sequence[Root] = ()) -> Trying:
+        trying = trying_without(self._snapshots, link, answers, self._most, around=around, others=others)
         return (yield from self._in_time(trying)) or [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=TIME_IS_OVER()))]
 
     def _in_time(self, work: Generator[None, None, _T]) -> Generator[None, None, _T | None]:
@@ -194,7 +194,7 @@ class PastQuestions:
             others = [link for other, link in faults.items() if other != name]
             if (yield from self._without_all(others, answer)).effect is Effect.OTHERWISE:
                 del faults[name]
-        if len(faults) == 1:
+        if len(faults) == 1 or self._is_over():  # what was not tried in time may have no part
             return ()
         found: list[ChainLink] = []
         for name in suspects:
@@ -207,7 +207,7 @@ class PastQuestions:
     def _without_all(self, links: Sequence[ChainLink], answer: Answer) -> Generator[None, None, Trial]:
         """The run without the roots of links."""
         others = [link.root for link in links[1:] if link.root is not None]
-        return (yield from trying_without(self._snapshots, links[0], (answer,), self._most, others=others))[0]
+        return (yield from self._trying(links[0], (answer,), others=others))[0]
 
     def _with_held(self, answer: Answer) -> Asking:
         """An answer with what the programs stand at, or are held by, that could have changed what it is about since."""
