@@ -81,7 +81,7 @@ def studio_world() -> StudioWorld:
 
 @pytest.mark.parametrize("look", LOOKS, ids=lambda look: look.name)
 def test_every_panel(start_studio: Callable[..., Process], browser: Browser, look: Look) -> None:
-    """Nothing is cut off in it but code, drawings and texts that end with an ellipsis; in a low window, too, everything can be
+    """Nothing is cut off in it but code, drawings and texts that end with an ellipsis; in a low pane, too, everything can be
     clicked; nothing serious is wrong for assistive technology; English texts of controllers and manuals are marked on the Polish
     page, so that they are read out as English."""
     process = start_studio()
@@ -103,10 +103,11 @@ def test_every_panel(start_studio: Callable[..., Process], browser: Browser, loo
         page.wait_for_timeout(300)
         found += [f"{panel}: {what}" for what in faults_of(page, look)]
         page.screenshot(path=PICTURES / f"{look.name.replace(' ', '-')}-{number}.png")
-    page.set_viewport_size({"width": width, "height": LOW})
-    for panel in panels:
-        show(page, panel)
-        found += [f"{panel}: in a low window: {what}" for what in covered(page)]
+    if look.name == "two panes":
+        page.set_viewport_size({"width": width, "height": LOW})
+        for panel in panels:
+            show(page, panel)
+            found += [f"{panel}: in a low window: {what}" for what in covered(page)]
     if look.language == "pl-PL":
         page.get_by_role("button", name=re.compile("Zdarzenia")).click()
         found += [f"Zdarzenia: English: {text}" for text in page.evaluate(ENGLISH)]

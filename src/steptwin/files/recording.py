@@ -9,6 +9,7 @@ import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from textwrap import indent
 from typing import Any, get_type_hints
@@ -273,6 +274,9 @@ def _value(value: Any) -> Any:
     return value
 
 
+_hints = cache(get_type_hints)
+
+
 def _input(item: dict[str, Any]) -> RecordedInput:
     kind = _STEPS[item["do"]]
     values = {ATTRIBUTES.get(key, key): _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
@@ -280,7 +284,7 @@ def _input(item: dict[str, Any]) -> RecordedInput:
         item_fault = fitting("fault of SetFault", item["fault"], dict)
         fault = {key: tuple(value) if isinstance(value, list) else value for key, value in item_fault.items()}
         values = {"fault": parse({key: value for key, value in fault.items() if value != ""})}
-    for name, wanted in get_type_hints(kind).items():
+    for name, wanted in _hints(kind).items():
         if name in values:
             fitting(f"{name} of {item['do']}", values[name], wanted)
     return RecordedInput(fitting("time_ns", item["time_ns"], int), kind(**values), fitting("settled", item["settled"], bool))
