@@ -123,6 +123,8 @@ class AxisCauses:
                 return
             before = max(self._log.plans_in_force(controller, axis, plan.time, plan.order), key=self._end, default=None)
             found = None if before is None else self.motion(controller, axis, plan.time, before=plan.order)
+            if before is None:
+                self._log.lack()
             if before is None or found is None or found.place.time < since:
                 return
             if found.cover is None:

@@ -80,7 +80,10 @@ class HoldingCauses:
         if not sources and owner in self._world.programs:
             pin = Resource(ResourceKind.PIN, terminal)
             last = self._all.programs.written(owner, pin, self._log.last_executed(owner, at) + 1)
-            yield from () if last is None else (last._replace(cover=Cover.LEVEL),)
+            if last is None:
+                self._log.lack()
+            else:
+                yield last._replace(cover=Cover.LEVEL)
             return
         last = self._all.last(sources, at)
         if last is not None and self.level(target, at) != closed and last.place.time + delay < at:

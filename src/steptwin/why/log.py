@@ -628,7 +628,11 @@ def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> 
 
 def levels_of(world: Simulation) -> dict[str, float]:
     """The present levels of all that has edges: pins, outputs of elements, contacts."""
-    found = {f"{name}.{pin}": level for name, controller in world.controllers.items() for pin, level in controller.pins().items()}
+    found = {
+        f"{name}.{pin}": world.objects.scheduler_of[name].level(PinName(name, pin))  # a fault may hold an output
+        for name, controller in world.controllers.items()
+        for pin in controller.pins()
+    }
     for kind, parts in world.objects.elements.items():
         if ELEMENTS[kind].terminals is not None:
             for name, part in parts.items():
