@@ -111,14 +111,14 @@ def test_drawing_is_arranged_by_mouse_and_keyboard_undone_and_saved(studio: Stud
     assert corner(page, "y") == dragged
     button(page, "✓ Done").click()
     button(page, "Save arrangement").click()
-    expect(page.get_by_text("The arrangement is saved in")).to_be_visible()
+    expect(page.get_by_text("has the change")).to_be_visible()
     assert DrawnPosition("y", *dragged) in kept(studio.process)
     again = studio.page(panel="Machine")
     expect(card(again, "y")).to_have_css("left", f"{dragged[0]}px")
     button(again, "Automatic arrangement").click()
     expect(card(again, "y")).to_have_css("position", "relative")
     button(again, "Save arrangement").click()
-    expect(again.get_by_text("The arrangement is saved in")).to_be_visible()
+    expect(again.get_by_text("has the change")).to_be_visible()
     assert kept(studio.process) == ()
 
 

@@ -1,4 +1,4 @@
-"""Requests for the arrangement of the machine panel: where axes and elements are drawn."""
+"""Requests for places in the description: of elements in space, and of strips in the machine panel."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
-from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, whole, wrong
+from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, number, whole, wrong
 from steptwin.jsonvalues import JsonForm
+from steptwin.simulation.components.mount import FARTHEST_MM
 from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPosition
 from steptwin.studio.requesttype import request
 
@@ -30,20 +31,36 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True)
 class SavedDrawing:
-    """The description of a world with its arrangement."""
+    """The description of a world with places that were changed."""
 
     file: Annotated[str | None, "What has been written; null: it cannot be written."]
     name: Annotated[str, "For a file."]
     text: Annotated[str, "The description with these places."]
 
 
+@dataclass(frozen=True, slots=True)
+class WrittenPlace:
+    """The place of an element in the text of the description, and another one."""
+
+    at: Annotated[tuple[float, float, float], "Where the description has it on what carries it, without the change [mm]"]
+    line: Annotated[int, "Of the description"]
+    old: Annotated[str, "What is there; empty: there is no such key"]
+    new: Annotated[str, "What is to be there"]
+    problems: Annotated[tuple[str, ...], "What would be found wrong with the description that is not now"]
+    saved: Annotated[SavedDrawing | None, "null: nothing was to be written"]
+
+
 class Arrangement(Protocol):
-    """Arrangement of one world."""
+    """Places in the description of one world."""
 
     def drawing(self) -> Drawing: ...
 
     def save(self, places: Sequence[DrawnPosition]) -> SavedDrawing:
         """Raises `Misuse` for what is not there, `Refusal` where the description cannot be changed."""
+        ...
+
+    def place(self, name: str, at: Sequence[float] | None, *, write: bool) -> WrittenPlace:
+        """Raises as `save`."""
         ...
 
 
@@ -98,4 +115,29 @@ class SaveDrawing:
     ]
 
 
-DrawingRequest: TypeAlias = ReadDrawing | SaveDrawing
+_MM = number(-FARTHEST_MM, FARTHEST_MM)
+
+
+def _point(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise wrong(value, POINT.what)
+    return tuple(map(_MM.read, value))
+
+
+POINT = ValueType("[x, y, z]", {"type": "array", "items": _MM.schema, "minItems": 3, "maxItems": 3}, _point, list)
+
+
+@request(
+    "place",
+    SERVICE._replace(control=False),
+    "Put an element elsewhere in the description, of which only numbers are changed. The world itself stays as it is.",
+    WrittenPlace,
+)
+@dataclass(frozen=True, slots=True)
+class Place:
+    name: Annotated[str, Meaning("Of the element.")]
+    at: Annotated[tuple[float, ...] | None, Meaning("On what carries it; without it: where it is.", POINT, unit="mm")] = None
+    write: Annotated[bool, Meaning("Without it, it is only said what would be written, and what would be wrong then.")] = False
+
+
+DrawingRequest: TypeAlias = ReadDrawing | SaveDrawing | Place

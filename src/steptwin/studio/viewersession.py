@@ -509,6 +509,7 @@ class ViewerSession:
             campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
             drawing.ReadDrawing: lambda self, _: self._hub.arrangement.drawing(),
             drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
+            drawing.Place: lambda self, one: self._hub.arrangement.place(one.name, one.at, write=one.write),
             work.Scan: lambda self, one: self._hub.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
             work.Verify: lambda self, wanted: self._hub.work.verify(wanted.address, write=wanted.write),
             work.ReadWork: lambda self, _: self._hub.work.last,

@@ -272,6 +272,11 @@ class TomlText:
         line, name = adopted.text.place((*adopted.path, *path[2:]))
         return line, name or adopted.text.source.name
 
+    def use_of(self, path: Path) -> int | None:
+        """The line of the use that puts a table of another text here; None where the table is of this text."""
+        adopted = self._adopted.get(path[:2])
+        return None if adopted is None else self.line(adopted.use)
+
     def line(self, path: Path) -> int:
         """The line (from 1) of a value, or of what holds it."""
         while path and path not in self._spans:

@@ -17,6 +17,14 @@ const UM_PER_MM = 1000;
 /** A turn that is seen. */
 const TURN = 1e-6;
 
+/** What elements are drawn with, seen elsewhere [mm in the picture], and a text with it. */
+export interface Ghost {
+  names: ReadonlySet<string>;
+  x: number;
+  y: number;
+  text: string;
+}
+
 /** What is shown of elements besides where they are. */
 export interface Marks extends Levels {
   selected: string;
@@ -70,6 +78,7 @@ export class Drawing {
   private readonly labels = new Map<string, SVGTextElement>();
   /** The solids of each element with a label. */
   private readonly named: ReadonlyMap<string, readonly number[]>;
+  private readonly copies: SVGGElement;
   private readonly frame: readonly number[];
   private ordered_ms = 0;
   private marks: Marks | null = null;
@@ -94,6 +103,27 @@ export class Drawing {
       const label = create("text", words);
       label.dataset["element"] = name;
       this.labels.set(name, label);
+    }
+    this.copies = create("g", svg, "copies");
+  }
+
+  /** In the place of those before. */
+  ghosts(wanted: readonly Ghost[]): void {
+    this.copies.replaceChildren();
+    for (const { names, x, y, text } of wanted) {
+      const moved = create("g", this.copies);
+      moved.setAttribute("transform", `translate(${x} ${-y})`);
+      const copy = this.all.cloneNode(false) as SVGGElement;
+      for (const part of this.all.children) {
+        const n = this.parts.indexOf(part as SVGGElement);
+        if (n < this.stage.aids && names.has(this.stage.solids[n]?.element ?? "")) copy.append(part.cloneNode(true));
+      }
+      moved.append(copy);
+      const box = copy.getBBox();
+      const label = create("text", moved);
+      label.textContent = text;
+      label.setAttribute("x", String((box.x + box.width / 2) / UM_PER_MM));
+      label.setAttribute("y", String(box.y / UM_PER_MM));
     }
   }
 
