@@ -1,4 +1,4 @@
-"""Goals of the guided search: five times fewer runs than random search until two slides meet, median of seeds, and never more
+"""Goals of the guided search: at most half the runs of a random search until two slides meet, median of seeds, and never more
 until other planted mistakes are found.
 
 Two slides pass the same place, each a while after its sensor. They meet there only where the delays differ by 1.5 s: a narrow
