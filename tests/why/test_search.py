@@ -139,7 +139,7 @@ def test_an_unchanged_part_of_the_past_is_not_run_again(monkeypatch: pytest.Monk
     monkeypatch.setattr(search, "in_parts", lambda world, inputs, end: runs.append(end) or run(world, inputs, end))
     assert finish(past.asking("m.OUT7")).since is None
     assert runs == []
-    assert finish(past.asking("x.position > 9 m")).since is None
+    assert finish(past.asking("other.M1_POS_ACT > 9")).since is None
     assert len(runs) <= 2, "near inputs it might move"
     runs.clear()
     assert finish(past.asking("m.IN1")).since == 1_100 * MILLISECOND
