@@ -25,6 +25,14 @@ def test_the_libraries_of_an_extra_are_those_of_the_package() -> None:
     assert {extra: names(libraries_of(extra)) for extra in extras} == {extra: names(all_of) for extra, all_of in extras.items()}
 
 
+def test_where_there_are_modules_only_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def requires(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.requires", requires)
+    assert str(missing("this", "lsp")).startswith("this needs the extra lsp, which could not be imported")
+
+
 def test_the_library_whose_internal_classes_are_used_has_the_bounds_of_the_version_that_is_tried() -> None:
     root = Path(__file__).parents[1]
     tried = re.search(r"^asyncua==(\d+)\.(\d+)", (root / "requirements/dev.txt").read_text(), re.MULTILINE)

@@ -15,11 +15,16 @@ def extras() -> list[str]:
 
 
 def libraries_of(extra: str) -> list[str]:
-    """The libraries of an extra as pip takes them (``aiomqtt<3``), from the metadata of the installed package."""
-    from importlib.metadata import requires
+    """The libraries of an extra as pip takes them (``aiomqtt<3``), from the metadata of the installed package; empty where there
+    are modules only, as in a page of a browser."""
+    from importlib.metadata import PackageNotFoundError, requires
 
     wanted = re.compile(rf"""extra == ["']{re.escape(extra)}["']""")
-    return [line.partition(";")[0].strip() for line in requires("steptwin") or () if wanted.search(line)]
+    try:
+        lines = requires("steptwin") or ()
+    except PackageNotFoundError:
+        return []
+    return [line.partition(";")[0].strip() for line in lines if wanted.search(line)]
 
 
 def lacking(extra: str) -> list[str]:
