@@ -196,7 +196,7 @@ $(PAGE): $(PAGE_SOURCES)
 	@$(WEB) build
 	@touch $@
 
-$(SITE): $(SITE_SOURCES) | $(DEV_STAMP) $(WEB_STAMP)
+$(SITE): $(SITE_SOURCES) | $(DEV_STAMP) $(WEB_STAMP) $(PAGE)
 	@echo "building the studio inside a page"
 	@$(WEB) site
 

@@ -16,8 +16,19 @@ import grimp
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src"
 HOSTS = ("steptwin.inpage.host", "steptwin.inpage.devices", "steptwin.inpage.editor")
-OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattr", "cattrs", "typing_extensions")
+JOBS = "steptwin.inpage.jobs"
+"""What only this reaches is in an archive of its own."""
+ABSENT = (
+    "campaign.store", "campaign.workers", "files.export.plot", "files.export.profileplot", "files.export.tables",
+    "files.export.vcd", "files.export.vcdtext", "files.scene.gltf", "history.database",
+)  # fmt: skip
+"""Modules for processes, databases and libraries that no page has."""
+OF_JOBS = SOURCE / "steptwin" / "files" / "export" / "page"
+"""Parts of timelines, which are no modules."""
+OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattrs", "typing_extensions")
 """Libraries of the editor server; they are in Python alone."""
+NOT_OF_EDITOR = ("pygls/cli.py", "pygls/client.py", "pygls/lsp/client.py", "pygls/lsp/_base_client.py", "cattrs/preconf/")
+"""Parts of them that no server imports."""
 PYODIDE = """Pyodide, under the Mozilla Public License 2.0, https://www.mozilla.org/MPL/2.0/; its source is at
 https://github.com/pyodide/pyodide. It has CPython in it, under the PSF License Agreement, https://docs.python.org/3/license.html.
 All files are as they were published, except python_stdlib.zip: of the modules in it those that are used are left, compiled."""
@@ -26,13 +37,23 @@ SITE = "build/site/try/service.js"
 DEMO = SOURCE / "steptwin" / "live" / "studio" / "demo_machine"
 
 
-def own() -> dict[str, str]:
-    """Path of each module in the archive, and on the disk."""
+def own() -> tuple[dict[str, str], dict[str, str]]:
+    """Path of each file in the archives of the twin and of jobs, and on the disk."""
     graph = grimp.build_graph("steptwin")
-    found = {name for host in HOSTS for name in (host, *graph.find_upstream_modules(host))}
-    found |= {name.rpartition(".")[0] for name in found} - {""}
-    paths = [SOURCE / name.replace(".", "/") for name in found]
-    files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths]
+    for name in ABSENT:
+        graph.remove_module(f"steptwin.{name}")
+    of_twin = _files({name for host in HOSTS for name in (host, *graph.find_upstream_modules(host))})
+    of_jobs = _files({JOBS, *graph.find_upstream_modules(JOBS)}) | set(OF_JOBS.iterdir())
+    return _named(of_twin), _named(of_jobs - of_twin)
+
+
+def _files(modules: set[str]) -> set[Path]:
+    packages = {name.rpartition(".")[0] for name in modules} - {""}
+    paths = [SOURCE / name.replace(".", "/") for name in modules | packages]
+    return {path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths}
+
+
+def _named(files: set[Path]) -> dict[str, str]:
     return {path.relative_to(SOURCE).as_posix(): str(path) for path in sorted(files)}
 
 
@@ -46,7 +67,7 @@ def libraries() -> dict[str, str]:
         files = origin.parent.rglob("*.py") if origin.name == "__init__.py" else [origin]
         root = origin.parent.parent if origin.name == "__init__.py" else origin.parent
         found |= {path.relative_to(root).as_posix(): str(path) for path in sorted(files)}
-    return found
+    return {name: path for name, path in found.items() if not name.startswith(NOT_OF_EDITOR)}
 
 
 def licences() -> str:
@@ -60,11 +81,12 @@ def licences() -> str:
 
 def main(target: str) -> None:
     programs = {path.name: str(path) for path in DEMO.glob("*.prg")}
-    world = {"name": "demo", "path": str(DEMO / "demo.toml"), "files": programs}
-    archives = {"steptwin": own(), "editor": libraries()}
+    world = {"name": "demo", "path": str(DEMO / "demo.toml"), "campaign": str(DEMO / "campaign.toml"), "files": programs}
+    of_twin, of_jobs = own()
+    archives = {"steptwin": of_twin, "jobs": of_jobs, "editor": libraries()}
     text = json.dumps({"archives": archives, "world": world, "licences": licences()})
     Path(target).write_text(text, "utf-8")
-    own_files = [*archives["steptwin"].values(), world["path"], *programs.values()]
+    own_files = [*of_twin.values(), *of_jobs.values(), world["path"], world["campaign"], *programs.values()]
     names = [Path(path).relative_to(ROOT).as_posix() for path in own_files]
     # A rule without a recipe for each of them: a file that has been removed makes the site anew too, and no error.
     rules = [f"{SITE}: {' '.join(names)}", *(f"{name}:" for name in names)]

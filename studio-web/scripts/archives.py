@@ -25,7 +25,7 @@ UNUSED = frozenset(
 
 
 def pack(sources: Mapping[str, str | bytes]) -> bytes:
-    """An archive of compiled modules, which is always the same. They have no docstrings, and of places lines only.
+    """An archive of compiled modules and other files, which is always the same. Modules have no docstrings, of places lines only.
 
     It is packed as a whole: a fifth smaller than one in which each module is packed, and Python need not unpack any of them."""
     return gzip.compress(archive_of(sources, zipfile.ZIP_STORED), 9, mtime=0)
@@ -35,6 +35,9 @@ def archive_of(sources: Mapping[str, str | bytes], compression: int = zipfile.ZI
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", compresslevel=9) as archive:
         for name, source in sorted(sources.items()):
+            if not name.endswith(".py"):
+                archive.writestr(zipfile.ZipInfo(name), source, compression)
+                continue
             code = marshal.dumps(compile(source, name, "exec", dont_inherit=True, optimize=2))
             unchecked = importlib.util.MAGIC_NUMBER + (1).to_bytes(4, "little") + bytes(8)
             archive.writestr(zipfile.ZipInfo(name + "c"), unchecked + code, compression)
@@ -48,11 +51,12 @@ def library(own: Mapping[str, str]) -> Mapping[str, bytes]:
     found: dict[str, bytes] = {}
     waiting = [name for name in sys.modules if not name.startswith("__")]
     for name, source in own.items():
+        if not name.endswith(".py"):
+            continue
         waiting += _named(source, name)
-    unused = UNUSED.difference(waiting)
+    unused = UNUSED.difference(*map(_with_packages, waiting))
     while waiting:
-        parts = waiting.pop().split(".")
-        for module in (".".join(parts[: count + 1]) for count in range(len(parts))):
+        for module in _with_packages(waiting.pop()):
             if module in unused:
                 break
             path = module.replace(".", "/")
@@ -61,6 +65,11 @@ def library(own: Mapping[str, str]) -> Mapping[str, bytes]:
                     found[file] = there[file]
                     waiting += _named(there[file], file)
     return found
+
+
+def _with_packages(module: str) -> list[str]:
+    parts = module.split(".")
+    return [".".join(parts[: count + 1]) for count in range(len(parts))]
 
 
 def _named(source: str | bytes, file: str) -> Iterator[str]:

@@ -28,8 +28,9 @@ for (const [archive, files] of Object.entries(archives)) {
   Object.assign(own, sources);
   const packed = pack(python.toPy(sources)).toJs();
   writeFileSync(`${folder}/python/${archive}.modules`, packed);
-  python.FS.writeFile(`/${archive}.zip`, gunzipSync(packed));
-  python.runPython(`import sys; sys.path.append("/${archive}.zip")`);
+  if (archive !== "steptwin") continue;
+  python.FS.writeFile("/steptwin.zip", gunzipSync(packed));
+  python.runPython('import sys; sys.path.append("/steptwin.zip")');
 }
 // Pyodide reads this one itself.
 writeFileSync(`${folder}/python/python_stdlib.zip`, archive_of(library(python.toPy(own))).toJs());
@@ -60,6 +61,7 @@ const { hello } = messages.find((message) => "hello" in message);
 mkdirSync(`${folder}/world`, { recursive: true });
 writeFileSync(`${folder}/world/${world.name}.hello.json`, JSON.stringify(hello));
 writeFileSync(`${folder}/world/${world.name}.toml`, text);
+writeFileSync(`${folder}/world/${world.name}.campaign.toml`, readFileSync(world.campaign));
 for (const [name, bytes] of Object.entries(files)) writeFileSync(`${folder}/world/${name}`, bytes);
 writeFileSync(`${folder}/world/${world.name}.json`, JSON.stringify({ files: Object.keys(files) }));
 // Last: it says that all is there.

@@ -56,7 +56,8 @@ def built() -> Path:
         if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
             pytest.fail("build/site has not been built: run 'make site'", pytrace=False)
         pytest.skip("build/site has not been built: run 'make site'")
-    modules = json.loads((ROOT / "build/modules.json").read_text("utf-8"))["archives"]["steptwin"].values()
+    archives = json.loads((ROOT / "build/modules.json").read_text("utf-8"))["archives"]
+    modules = [*archives["steptwin"].values(), *archives["jobs"].values()]
     for source in [*map(Path, modules), *(ROOT / "studio-web/src/site").iterdir()]:
         if not source.exists() or source.stat().st_mtime > made.stat().st_mtime:
             pytest.fail(f"{source.relative_to(ROOT)} is not what build/site has in it: run 'make site'", pytrace=False)

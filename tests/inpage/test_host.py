@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
@@ -48,6 +48,7 @@ class Page:
         self.errors: list[str] = []
         self.refusals: list[str] = []
         self.downloads: list[tuple[str, str]] = []
+        self.jobs: list[Any] = []
         self.kept = b""
         self.number = 1
         """Of its connection."""
@@ -76,6 +77,12 @@ class Page:
         self.twin.connections.close(self.number)
         self.number += 1
         self.twin.connections.open(self.number)
+
+    def runJob(self, job: Mapping[str, object]) -> None:  # noqa: N802  as the page names it
+        self.jobs.append(job)
+
+    def endJob(self) -> None:  # noqa: N802
+        self.jobs.append(None)
 
     def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
         self.downloads.append((file, text))
@@ -145,9 +152,10 @@ def test_a_viewer_enters_moves_an_axis_and_leaves_while_the_world_goes_on() -> N
         assert hello["role"] == "engineer"
         assert hello["device_kinds"] == []
         # What needs a service, files or processes is not offered.
-        missing = {"connect", "ports", "scan", "end_points", "leave_world", "gateways", "campaigns", "history"}
+        missing = {"connect", "ports", "scan", "end_points", "leave_world", "gateways", "history"}
         assert missing & set(hello["may"]) == set()
         assert {"move", "fault", "show_moment", "why", "breakpoint", "download", "resume", "save_recording"} <= set(hello["may"])
+        assert {"run_campaign", "end_campaign", "change_campaign"} <= set(hello["may"])
         await page.ask("enable", controller="table", axis=1, on=True)
         await page.ask("move", controller="table", axis=1, to=20.0)
         await asyncio.sleep(2)

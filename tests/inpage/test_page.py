@@ -24,6 +24,8 @@ from tests.studio.conftest import browser, require_node, web_builder  # noqa: F4
 from web_serial import WebSerial
 
 from steptwin import Misuse, World
+from steptwin.campaign.campaign import Campaign
+from steptwin.live.studio.demo import FOLDER
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -396,6 +398,45 @@ def test_a_hidden_tab_goes_on_or_pauses_as_chosen(demo: Demo) -> None:
     expect(time_of(page)).to_contain_text("paused")
     page.evaluate(HIDE, False)
     expect(time_of(page)).to_contain_text("live")  # the choice is kept: other tabs have it
+
+
+def test_a_campaign_is_ended_in_the_midst_and_has_the_results_of_cpython(demo: Demo, tmp_path: Path) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Campaigns")
+    campaign = page.get_by_role("region", name="campaign", exact=True)
+    text = campaign.get_by_role("textbox")
+    whole = text.input_value()
+    workers = len(page.workers)
+    text.fill(whole.replace("runs = 30", "runs = 200"))
+    button(page, "Run campaign").click()
+    expect(campaign).to_contain_text(re.compile(r"[1-9]\d* of 200 runs"), timeout=LOADING_MS)
+    assert len(page.workers) == workers + 1
+    button(page, "End campaign").click()
+    expect(campaign).to_contain_text("ended before its last run")
+    until(page, lambda: len(page.workers) == workers, "its worker has ended")
+    expect(time_of(page)).to_contain_text("live")
+    stood = time_of(page).inner_text()
+    expect(time_of(page)).not_to_have_text(stood)
+
+    few = whole.replace("runs = 30", "runs = 4")
+    text.fill(few)
+    button(page, "Run campaign").click()
+    expect(campaign).to_contain_text("of 4 runs pass", timeout=LOADING_MS)
+    with page.expect_download() as saved:
+        button(page, "Report of campaign").click()
+    report = tmp_path / "report.html"
+    saved.value.save_as(report)
+    for file in FOLDER.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "campaign.toml").write_text(few)
+    assert Campaign.load(tmp_path / "campaign.toml").run().digest in report.read_text("utf-8")
+
+    text.fill(whole.replace("runs = 30", "runs = 201"))
+    button(page, "Run campaign").click()
+    expect(campaign).to_contain_text("a page runs at most 200")
+    button(page, "Text as at first").click()
+    expect(text).to_have_value(whole)
 
 
 def until(page: Page, condition: Callable[[], bool], what: str) -> None:

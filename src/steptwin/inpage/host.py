@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Protocol
 
 from steptwin.access.roles import Role
 from steptwin.controller import Nanos
@@ -16,6 +17,7 @@ from steptwin.devices.composite import CompositeSubject
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.inpage.branches import PageBranches
+from steptwin.inpage.campaigns import TEMPLATE, CampaignPage, PageCampaigns
 from steptwin.inpage.connections import Connections, Page
 from steptwin.inpage.linked import LinkedTexts
 from steptwin.inpage.pagestudio import PageStudio
@@ -39,32 +41,46 @@ NOT_BESIDE_DEVICES = Message(
 )
 
 
+class TwinPage(Page, CampaignPage, Protocol):
+    """Messages to the page of a twin."""
+
+
 class PageTwin:
     """The machine of a page, its branches, and a recording that is viewed: one of them is shown. Everybody is an engineer, for
     nobody else reaches it; in a recording nothing can be changed."""
 
     def __init__(
         self,
-        page: Page,
+        page: TwinPage,
         name: str,
         text: str,
         files: Mapping[str, bytes | memoryview],
         clock: Callable[[], Nanos] = time.monotonic_ns,
         kept: bytes | None = None,
+        campaign: str | None = None,
     ) -> None:
         """``text``: a description; ``files``: those that it names; ``kept``: a state of this twin that the page was given, from
-        which it goes on instead, unrecorded, for its beginning is not known. Raises `WorldError` for a wrong description."""
+        which it goes on instead, unrecorded, for its beginning is not known; ``campaign``: the text of one that belongs to it.
+        Raises `WorldError` for a wrong description."""
         contents = {file: bytes(content) for file, content in files.items()}
         self.world = world = World.from_toml(text, contents, name=name) if kept is None else _world_at(name, kept)
         self._page = page
         self._clock = clock
+        self._name = name
         self._text = text
         self._begins_at = 1.0 if kept is None else 0.0
         self._machine = self._shown = machine = PageStudio(world, page, clock)
         self.hub = machine.hub
         self.subject: CompositeSubject = machine.subject
         recordings = PageRecordings(machine, page, self._check_devices, self._view)
-        self.hub.around = replace(self.hub.around, recordings=recordings, recording_files=recordings)
+        self.campaigns = campaigns = PageCampaigns(page, campaign or TEMPLATE.format(world=f"{name}.toml"), self._files)
+        self.hub.around = replace(
+            self.hub.around,
+            recordings=recordings,
+            recording_files=recordings,
+            campaigns=campaigns,
+            campaign_texts=campaigns,
+        )
         self._offer_branches(machine)
         self.connections = Connections(self._serve, page)
         self._linked = LinkedTexts(world.blueprint.files, self.hub.around.programs)
@@ -79,9 +95,12 @@ class PageTwin:
     def link(self) -> str:
         """Description and programs of the machine at present as JSON, as a link has them; ``refused``: why it has none."""
         try:
-            return json.dumps({"description": self._text, "programs": self._linked.present()})
+            return json.dumps({"description": self._text, "programs": self._linked.linked()})
         except Misuse as error:
             return json.dumps({"refused": str(error)})
+
+    def _files(self) -> Mapping[str, bytes]:
+        return {f"{self._name}.toml": self._text.encode(), **self._linked.files()}
 
     def offer(self, connections: DeviceConnections) -> None:
         """Devices can be connected to the machine from now on; viewers are told."""
@@ -153,11 +172,16 @@ def _world_at(name: str, kept: bytes) -> World:
 
 
 def open_twin(
-    page: Page, name: str, text: str, files: Mapping[str, bytes | memoryview], kept: bytes | None = None
+    page: TwinPage,
+    name: str,
+    text: str,
+    files: Mapping[str, bytes | memoryview],
+    kept: bytes | None = None,
+    campaign: str | None = None,
 ) -> PageTwin | None:
     """A twin that can be used; None where its description is wrong, after the page was given the reason."""
     try:
-        twin = PageTwin(page, name, text, files, kept=kept and bytes(kept))
+        twin = PageTwin(page, name, text, files, kept=kept and bytes(kept), campaign=campaign)
     except Misuse as error:
         page.refused(str(error))
         return None

@@ -1,4 +1,4 @@
-"""Description and programs of a twin, as a link has them."""
+"""Programs of a twin as they are at present, for a link and a campaign."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from steptwin.studio.programs import ProgramTexts
 SUFFIXES = frozenset(language.suffix for kind in KINDS.values() for language in kind.languages)
 """Suffixes of files with programs and positions."""
 NO_PROGRAM = Message("inpage.no-program", "{name}: a link can have files with programs only, which end in {suffixes}")
-NOT_NAMED = Message("inpage.not-named", "{controller}: the description names no file for {place}, so a link cannot have its text")
+NOT_NAMED = Message(
+    "inpage.not-named",
+    "{controller}: the description names no file for {place}, so neither a link nor a campaign can have its text",
+)
 TWO_TEXTS = Message(
-    "inpage.two-texts", "{name}: it is the file of several places, whose texts differ now; a link has one text for it"
+    "inpage.two-texts",
+    "{name}: it is the file of several places, whose texts differ now; a link or a campaign has one text for it",
 )
 
 
@@ -28,11 +32,18 @@ class LinkedTexts:
         self._programs = programs
         self._names = {(one.controller, one.place): one.name for one in programs.list() if one.name in files}
 
-    def present(self) -> Mapping[str, str]:
+    def linked(self) -> Mapping[str, str]:
         """The texts by the names of their files. Raises `Misuse` where a link cannot have them."""
         for name in self._files:
             if PurePath(name).suffix not in SUFFIXES:
                 raise Misuse(NO_PROGRAM(name=name, suffixes=sorted(SUFFIXES)))
+        return self._present()
+
+    def files(self) -> Mapping[str, bytes]:
+        """All files that the description names, with the present texts. Raises `Misuse` where a text belongs to no file."""
+        return {**self._files, **{name: text.encode() for name, text in self._present().items()}}
+
+    def _present(self) -> Mapping[str, str]:
         found: dict[str, str] = {}
         for one in self._programs.list():
             name = self._names.get((one.controller, one.place))

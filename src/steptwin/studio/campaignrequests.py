@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Protocol, TypeAlias
+from typing import Annotated, Any, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.fields import Meaning
+from steptwin.messages import Message
 from steptwin.studio.requesttype import request
+
+MOST_CAUSES = 100
+CAMPAIGN_IS_RUNNING = Message("studio.campaign-is-running", "{name} runs: one campaign at a time")
+UNKNOWN_CAMPAIGN = Message("studio.unknown-campaign", "no campaign {name!r}: there are {names}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +47,19 @@ class CampaignResult:
     properties: tuple[PropertyResult, ...]
     causes: tuple[FailureCause, ...]
 
+    @classmethod
+    def of(cls, report: Any) -> CampaignResult:
+        """As ``report.json`` has it. Raises what Python does where it is none."""
+        properties = [PropertyResult(name, one["failed"], one["robustness"]) for name, one in report["properties"].items()]
+        causes = tuple(map(_cause, report["causes"][:MOST_CAUSES]))
+        interval = tuple(report["interval"])
+        return cls(report["runs"], report["failed"], report["pass_rate"], interval, tuple(properties), causes)
+
+
+def _cause(one: Mapping[str, Any]) -> FailureCause:
+    files = one["files"]
+    return FailureCause(one["what"], one["where"], one["count"], files.get("session"), files.get("timeline"))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignState:
@@ -57,6 +75,7 @@ class CampaignState:
     total: Annotated[int | None, "How many runs it has, where its file says so."]
     changed: Annotated[str | None, "When its results changed last: wall clock, ISO 8601."] = None
     result: Annotated[CampaignResult | None, "Of the last one that ended; its report is among the files."] = None
+    text: Annotated[str | None, "Its text, where change_campaign changes it."] = None
 
 
 class Campaigns(Protocol):
@@ -74,6 +93,14 @@ class Campaigns(Protocol):
 
     async def file(self, name: str) -> str:
         """The path of a file of results, which begins with ``results`` of a campaign. Raises `Misuse`."""
+        ...
+
+
+class CampaignTexts(Protocol):
+    """Campaigns whose texts are in no file."""
+
+    async def change(self, campaign: str, text: str | None) -> None:
+        """None: the text that it had at first. Raises `Misuse` where there is no such campaign, `Refusal` while it runs."""
         ...
 
 
@@ -108,3 +135,10 @@ class EndCampaign:
 
 
 CampaignRequest: TypeAlias = ListCampaigns | RunCampaign | EndCampaign
+
+
+@request("change_campaign", KEEP, "Change the text of a campaign that is in no file. Another text has no results yet.")
+@dataclass(frozen=True, slots=True)
+class ChangeCampaign:
+    campaign: _Name
+    text: Annotated[str | None, Meaning("Left out: the text that it had at first.")] = None

@@ -19,7 +19,7 @@ from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
-from steptwin.studio.campaignrequests import Campaigns
+from steptwin.studio.campaignrequests import Campaigns, CampaignTexts
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.controllers import Sheets
 from steptwin.studio.drawingrequests import Arrangement
@@ -114,6 +114,7 @@ NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "no world to branch he
 NOT_IN_PLACE = Message("studio.not-in-place", "{request}: here no world is shown in place of another one")
 NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "no world to draw here: start the studio with the file of a world")
 NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "no world here, so no gateways and no history")
+CAMPAIGNS_ARE_FILES = Message("studio.campaigns-are-files", "the campaigns of this studio are files: change these")
 NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "no campaigns here: start the studio with the file of a world")
 NO_DEVICES = Message("studio.no-devices", "devices cannot be connected here: that needs the studio on a computer")
 NO_WORLD_WITH_LINES = Message("studio.no-world-with-lines", "no world here, so no lines whose traffic is counted")
@@ -229,6 +230,13 @@ class Hub:
         return self.around.campaigns
 
     @property
+    def campaign_texts(self) -> CampaignTexts:
+        """Raises `Refusal` where they are in files."""
+        if self.around.campaign_texts is None:
+            raise Refusal(CAMPAIGNS_ARE_FILES())
+        return self.around.campaign_texts
+
+    @property
     def connections(self) -> Connections:
         """Raises `Refusal` where no device can be connected."""
         if self.around.connections is None:
@@ -283,6 +291,7 @@ class Hub:
             (around.arrangement, OF_DRAWINGS),
             (around.services, OF_SERVICES),
             (around.campaigns, OF_CAMPAIGNS),
+            (around.campaign_texts, frozenset({"change_campaign"})),
             (around.connections, OF_DEVICES),
             (around.work, OF_WORK),
             (around.traffic, frozenset({"traffic"})),

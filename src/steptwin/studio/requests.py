@@ -23,7 +23,7 @@ from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
 from steptwin.studio.branchrequests import BranchRequest, PlaceRequest
-from steptwin.studio.campaignrequests import CampaignRequest
+from steptwin.studio.campaignrequests import CampaignRequest, ChangeCampaign
 from steptwin.studio.devicerequests import DeviceRequest
 from steptwin.studio.drawingrequests import DrawingRequest
 from steptwin.studio.recordingrequests import RecordingFileRequest, RecordingRequest
@@ -360,6 +360,7 @@ StudioRequest: TypeAlias = (
     | DrawingRequest
     | ServiceRequest
     | CampaignRequest
+    | ChangeCampaign
     | DeviceRequest
 )
 """In the order in which they are listed. Another request is a class, its place here, and what does it in
@@ -384,7 +385,7 @@ OF_RECORDING_FILES = _names(RecordingFileRequest)
 OF_BRANCHES, OF_DRAWINGS, OF_SERVICES = _names(BranchRequest), _names(DrawingRequest), _names(ServiceRequest)
 """Requests that need a world."""
 OF_CAMPAIGNS = _names(CampaignRequest)
-"""Requests that need a world of a file."""
+"""Requests that need a world of a file, or a page that is given a campaign with its world."""
 OF_DEVICES = _names(DeviceRequest) | {"ports", "connect", "disconnect"}
 """Requests that need a computer to which devices are connected."""
 OF_WORK = _names(WorkRequest)

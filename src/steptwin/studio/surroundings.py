@@ -13,7 +13,7 @@ from steptwin.controller import Nanos
 from steptwin.devices.digitalshadow import ShadowState
 from steptwin.diagnostics import SourceText
 from steptwin.studio.branchrequests import Branches
-from steptwin.studio.campaignrequests import Campaigns
+from steptwin.studio.campaignrequests import Campaigns, CampaignTexts
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.modelfiles import ModelFiles
 from steptwin.studio.programs import ProgramTexts
@@ -156,6 +156,8 @@ class Surroundings:
     """None without a world."""
     campaigns: Campaigns | None = None
     """None without a world whose description is in a file."""
+    campaign_texts: CampaignTexts | None = None
+    """None where the texts of campaigns are in files."""
     traffic: Callable[[], tuple[LineUse, ...]] | None = None
     """None without a world."""
     on_internal: Callable[[Exception], object] = lambda error: None

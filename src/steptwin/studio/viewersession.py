@@ -507,6 +507,7 @@ class ViewerSession:
             campaign.ListCampaigns: lambda self, _: self._hub.campaigns.list(),
             campaign.RunCampaign: lambda self, wanted: self._hub.campaigns.run(wanted.campaign),
             campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
+            campaign.ChangeCampaign: lambda self, wanted: self._hub.campaign_texts.change(wanted.campaign, wanted.text),
             drawing.ReadDrawing: lambda self, _: self._hub.arrangement.drawing(),
             drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
             drawing.Place: lambda self, one: self._hub.arrangement.place(one.name, one.at, write=one.write),

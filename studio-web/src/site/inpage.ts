@@ -6,7 +6,7 @@ import type { Answer } from "../lib/protocol/types";
 import { pack, type Linked } from "./links";
 import Offline from "./Offline.svelte";
 import { SerialPorts } from "./serial";
-import type { FromWorker, Task, Texts, ToWorker } from "./messages";
+import type { FromWorker, Job, Task, Texts, ToWorker } from "./messages";
 
 interface Waiting<T> {
   done(value: T): void;
@@ -17,10 +17,14 @@ const [HIDDEN, VERSION] = ["hidden.pauses", 1];
 const isChoice = (value: unknown): value is boolean => typeof value === "boolean";
 const ENDED = "the worker of the twin has ended";
 
+type OfJobs = Extract<FromWorker, { job: unknown } | { results: unknown }>;
+
 /** A worker with Python in it. It goes on when a connection to it ends. */
 class PythonWorker {
   /** The last state that it gave. */
   kept?: Uint8Array;
+  /** Gets what a twin says of jobs, and what comes of them. */
+  ofJobs: (message: OfJobs) => void = () => undefined;
   private readonly worker = new Worker(new URL("./python.worker.ts", import.meta.url), { type: "module" });
   private readonly links = new Map<number, LinkEvents>();
   private readonly asked: Waiting<Texts>[] = [];
@@ -60,6 +64,15 @@ class PythonWorker {
   link(): Promise<string> {
     this.tell({ link: true });
     return new Promise((done, failed) => this.askedForLink.push({ done, failed }));
+  }
+
+  run(run: Job): void {
+    this.tell({ run });
+  }
+
+  /** What comes of the job that the twin wanted. */
+  inform(news: string): void {
+    this.tell({ news });
   }
 
   /** Time stands while the page is hidden. */
@@ -120,16 +133,20 @@ class PythonWorker {
     } else if ("file" in message) save(new Blob([message.text], { type: "application/json" }), message.file);
     else if ("kept" in message) this.kept = message.kept;
     else if ("swapped" in message) this.swapped();
+    else if ("job" in message || "results" in message) this.ofJobs(message);
     else if ("progress" in message) this.loading({ phase: message.progress });
     else this.fail(message.failed);
   }
 }
 
-/** The studio inside the page: a twin in one worker, and the editor server in another one when it is asked for. */
+/** The studio inside the page: a twin in one worker; the editor server, and what runs campaigns, in others when they are asked for. */
 export class InPage implements Backend {
   readonly origin = Offline;
   private twin: PythonWorker;
   private editor: PythonWorker | null = null;
+  private jobs: PythonWorker | null = null;
+  /** Files of the last campaign that ended. */
+  private results: Texts = {};
   private tellLoading: ((loading: Loading) => void) | null = null;
   private isOther = false;
   private tellSwapped: () => void = () => undefined;
@@ -148,7 +165,7 @@ export class InPage implements Backend {
 
   /** `kept`: a state of a twin that has ended, from which this one goes on. */
   private start(kept?: Uint8Array): PythonWorker {
-    return new PythonWorker(
+    const twin = new PythonWorker(
       this.root,
       this.task(kept),
       (loading) => {
@@ -157,6 +174,31 @@ export class InPage implements Backend {
       },
       () => this.swap(true),
     );
+    twin.ofJobs = (message) => {
+      if (!("job" in message)) return;
+      if (message.job === null) this.endJobs();
+      else (this.jobs ??= this.startJobs()).run(message.job);
+    };
+    return twin;
+  }
+
+  private startJobs(): PythonWorker {
+    const jobs = new PythonWorker(this.root, Promise.resolve({ jobs: true }), (loading) => {
+      if (!("failed" in loading)) return;
+      this.endJobs();
+      this.twin.inform(JSON.stringify({ error: loading.failed }));
+    });
+    jobs.ofJobs = (message) => {
+      if (!("results" in message) || jobs !== this.jobs) return;
+      if (Object.keys(message.results).length) this.results = message.results;
+      this.twin.inform(message.news);
+    };
+    return jobs;
+  }
+
+  private endJobs(): void {
+    this.jobs?.end();
+    this.jobs = null;
   }
 
   follow(listener: (loading: Loading) => void): void {
@@ -196,7 +238,10 @@ export class InPage implements Backend {
   };
 
   file(kind: FileKind, name: string): Promise<Blob> {
-    return Promise.reject(new Error(`${kind}: no file ${name} in a page`));
+    const content = kind === "campaigns" ? this.results[name] : undefined;
+    return content === undefined
+      ? Promise.reject(new Error(`${kind}: no file ${name} in a page`))
+      : Promise.resolve(new Blob([content as Uint8Array<ArrayBuffer>]));
   }
 
   address(): null {
@@ -225,6 +270,7 @@ export class InPage implements Backend {
 
   restart(): void {
     const ended = this.twin;
+    this.endJobs();
     this.twin = this.start(ended.kept);
     if (this.isOther) this.swap(false);
     this.tellLoading?.({ phase: "python" });
@@ -254,10 +300,11 @@ export class InPage implements Backend {
     }
     const { files } = (await (await this.get(`${this.name}.json`)).json()) as { files: string[] };
     const text = await (await this.get(`${this.name}.toml`)).text();
+    const campaign = await (await this.get(`${this.name}.campaign.toml`)).text();
     const contents = files.map(
       async (file) => [file, new Uint8Array(await (await this.get(file)).arrayBuffer())] as const,
     );
-    return { twin: { name: this.name, text, files: Object.fromEntries(await Promise.all(contents)), kept } };
+    return { twin: { name: this.name, text, files: Object.fromEntries(await Promise.all(contents)), kept, campaign } };
   }
 
   private async get(file: string): Promise<Response> {

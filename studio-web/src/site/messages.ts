@@ -5,9 +5,19 @@ import type { Loading } from "../lib/protocol/backend";
 /** Contents by name. */
 export type Texts = Record<string, Uint8Array>;
 
-/** What a worker is for: a twin of a description, with the files that it names, from its beginning or a state that another worker
- * gave; or the editor server for texts by address. */
-export type Task = { twin: { name: string; text: string; files: Texts; kept?: Uint8Array } } | { editor: Texts };
+/** What a worker is for: a twin of a description, with the files that it names and a campaign, from its beginning or a state that
+ * another worker gave; the editor server for texts by address; or jobs, one at a time, in the midst of which it is ended. */
+export type Task =
+  | { twin: { name: string; text: string; files: Texts; kept?: Uint8Array; campaign?: string } }
+  | { editor: Texts }
+  | { jobs: true };
+
+/** Arguments of `steptwin.inpage.jobs.PageJobs.run`. */
+export interface Job {
+  text: string;
+  files: Texts;
+  known: string[];
+}
 
 /** What a worker asks of a serial port, by its number. `at`: of the wall clock [ms]. */
 export type FromPort =
@@ -36,7 +46,10 @@ export type ToWorker =
   | { texts: true }
   | { link: true }
   /** Time stands while the page is hidden. */
-  | { hidden: boolean };
+  | { hidden: boolean }
+  | { run: Job }
+  /** JSON of `steptwin.inpage.jobs.JobsPage.tell`, for the twin. */
+  | { news: string };
 
 export type FromWorker =
   | FromPort
@@ -54,6 +67,10 @@ export type FromWorker =
   | { texts: Texts }
   /** JSON of `PageTwin.link`. */
   | { link: string }
+  /** What the twin wants of the worker for jobs: null: its end. */
+  | { job: Job | null }
+  /** What comes of a job: JSON for the twin, and files for the user. */
+  | { news: string; results: Texts }
   /** A state from which another worker can go on. */
   | { kept: Uint8Array }
   /** Nothing will come any more. */

@@ -1,7 +1,7 @@
 import type { PyodideInterface } from "pyodide";
 import type { PyProxy } from "pyodide/ffi";
 import { Batches } from "../lib/protocol/batches";
-import type { FromWorker, Phase, Task, Texts, ToPort, ToWorker } from "./messages";
+import type { FromWorker, Job, Phase, Task, Texts, ToPort, ToWorker } from "./messages";
 
 /** `steptwin.inpage.connections.Connections`. */
 interface Connections {
@@ -25,8 +25,14 @@ interface Ports {
   lost(number: number, why: string): void;
 }
 
+/** `steptwin.inpage.jobs.PageJobs`. */
+interface Jobs {
+  run(text: string, files: PyProxy, known: PyProxy): void;
+}
+
 /** `steptwin.inpage.host.PageTwin`. */
 interface Twin extends Editor {
+  campaigns: { take(news: string): void };
   texts(): PyProxy;
   link(): string;
   hide(isHidden: boolean): void;
@@ -64,7 +70,9 @@ class Outgoing {
 
 const outgoing = new Map<number, Outgoing>();
 
-/** `steptwin.inpage.devices.DevicePage`. */
+const asObject = <T>(given: PyProxy) => given.toJs({ dict_converter: Object.fromEntries }) as T;
+
+/** `steptwin.inpage.devices.DevicePage`, `steptwin.inpage.host.TwinPage` and `steptwin.inpage.jobs.JobsPage`. */
 const page = {
   opened: (number: number) => tell({ opened: number }),
   send: (number: number, text: string) => outgoing.get(number)?.add(text),
@@ -79,11 +87,23 @@ const page = {
   saveText: (file: string, text: string) => tell({ file, text }),
   swapped: () => tell({ swapped: true }),
   keep: (state: PyProxy) => tell({ kept: state.toJs() as Uint8Array }),
+  runJob: (job: PyProxy) => tell({ job: asObject<Job>(job) }),
+  endJob: () => tell({ job: null }),
+  tell: (news: string, results: PyProxy) => tell({ news, results: asObject<Texts>(results) }),
   refused: (text: string) => tell({ failed: text }),
   failed: (text: string) => console.error(text),
 };
 
-let host: Twin | Editor | null = null;
+type Host = Twin | Editor | Jobs;
+
+/** The module of a host, and the archives that it needs. */
+const HOSTS = {
+  twin: ["host", "steptwin"],
+  editor: ["editor", "steptwin", "editor"],
+  jobs: ["jobs", "steptwin", "jobs"],
+} as const;
+
+let host: Host | null = null;
 let python: PyodideInterface | null = null;
 let ports: Ports | null = null;
 let waiting: ToWorker[] = [];
@@ -92,7 +112,7 @@ async function start(task: Task, root: string): Promise<void> {
   during("python");
   const folder = `${root}python/`;
   const { loadPyodide } = (await import(/* @vite-ignore */ `${folder}pyodide.mjs`)) as typeof import("pyodide");
-  const archives = "twin" in task ? ["steptwin"] : ["steptwin", "editor"];
+  const [module, ...archives] = HOSTS["twin" in task ? "twin" : "editor" in task ? "editor" : "jobs"];
   const [pyodide, ...files] = await Promise.all([
     loadPyodide({ indexURL: folder }) as Promise<PyodideInterface>,
     ...archives.map((name) => unpacked(`${folder}${name}.modules`)),
@@ -101,24 +121,30 @@ async function start(task: Task, root: string): Promise<void> {
   during("modules");
   // Nearly all that modules make stays: to look for what does not took a tenth of the time.
   pyodide.runPython("import gc, sys; gc.disable()");
-  archives.forEach((name, i) => {
-    pyodide.FS.writeFile(`/${name}.zip`, files[i] as Uint8Array);
-    pyodide.runPython(`sys.path.append("/${name}.zip")`);
-  });
-  const room = pyodide.pyimport("twin" in task ? "steptwin.inpage.host" : "steptwin.inpage.editor");
+  archives.forEach((name, i) => pyodide.FS.writeFile(`/${name}.zip`, files[i] as Uint8Array));
+  // A package has one archive only: what others add to it goes into the first one.
+  for (const name of archives.slice(1)) pyodide.runPython(ADD.replace("NAME", name));
+  pyodide.runPython('sys.path.append("/steptwin.zip")');
+  const room = pyodide.pyimport(`steptwin.inpage.${module}`);
   during("world");
   if ("twin" in task) {
-    const { name, text, files, kept } = task.twin;
-    const twin: Twin | undefined = room.open_twin(page, name, text, pyodide.toPy(files), pyodide.toPy(kept));
+    const { name, text, files, kept, campaign } = task.twin;
+    const twin: Twin | undefined = room.open_twin(page, name, text, pyodide.toPy(files), pyodide.toPy(kept), campaign);
     if (twin === undefined) return;
     host = twin;
-  } else {
-    host = room.PageEditor(page, pyodide.toPy(task.editor)) as Editor;
-  }
+  } else if ("editor" in task) host = room.PageEditor(page, pyodide.toPy(task.editor)) as Editor;
+  else host = room.PageJobs(page) as Jobs;
   pyodide.runPython("gc.freeze(); gc.enable()");
   for (const message of waiting) take(host, message);
   waiting = [];
 }
+
+const ADD = `
+from zipfile import ZipFile
+with ZipFile("/steptwin.zip", "a") as whole, ZipFile("/NAME.zip") as more:
+    for one in more.infolist():
+        whole.writestr(one, more.read(one))
+`;
 
 async function unpacked(address: string): Promise<Uint8Array> {
   const { ok, status, statusText, body } = await fetch(address);
@@ -167,9 +193,15 @@ function takeFromPort(ports: Ports, message: ToPort): void {
   else ports.lost(port, message.lost);
 }
 
-function take(host: Twin | Editor, message: ToWorker): void {
+function take(host: Host, message: ToWorker): void {
+  if (!("connections" in host)) {
+    if ("run" in message) host.run(message.run.text, python?.toPy(message.run.files), python?.toPy(message.run.known));
+    return;
+  }
   const { connections } = host;
-  if ("port" in message) {
+  if ("news" in message) {
+    if ("campaigns" in host) host.campaigns.take(message.news);
+  } else if ("port" in message) {
     if (ports !== null) takeFromPort(ports, message);
   } else if ("offer" in message) offer(message.offer, message.what);
   else if ("given" in message) python?.FS.writeFile(message.given, message.content);
@@ -183,8 +215,7 @@ function take(host: Twin | Editor, message: ToWorker): void {
   } else if ("close" in message) connections.close(message.close);
   else if ("hidden" in message && "hide" in host) host.hide(message.hidden);
   else if ("link" in message && "link" in host) tell({ link: host.link() });
-  else if ("texts" in message && "texts" in host)
-    tell({ texts: host.texts().toJs({ dict_converter: Object.fromEntries }) as Texts });
+  else if ("texts" in message && "texts" in host) tell({ texts: asObject<Texts>(host.texts()) });
 }
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {

@@ -21,12 +21,11 @@ from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.messages import NONE, Message
-from steptwin.studio.campaignrequests import CampaignResult, CampaignState, FailureCause, PropertyResult
+from steptwin.studio.campaignrequests import CAMPAIGN_IS_RUNNING, UNKNOWN_CAMPAIGN, CampaignResult, CampaignState
 
 TABLE = "campaign"
 MOST_FILES = 500
 """Limit of the descriptions that are read."""
-MOST_CAUSES = 100
 PASSED, FAILED = 0, 1
 """Exit codes of a campaign that has ended."""
 SERVED = (".html", ".json", ".xml", ".csv", ".py")
@@ -45,8 +44,6 @@ class _CampaignFile:
         return self.file.with_suffix(SUFFIX)
 
 
-CAMPAIGN_IS_RUNNING = Message("live.campaign-is-running", "{name} runs: one campaign at a time")
-UNKNOWN_CAMPAIGN = Message("live.unknown-campaign", "no campaign {name!r}: there are {names}")
 NO_FILE_OF_RESULTS = Message("live.no-file-of-results", "{name!r} is not a file of the results of a campaign here")
 
 
@@ -178,13 +175,5 @@ def _changed(database: Path) -> str:
 def _result(report: Path) -> CampaignResult | None:
     """Result of a campaign that has ended; None where it has not."""
     with suppress(SteptwinError, LookupError, TypeError, ValueError, AttributeError):
-        data = json.loads(read_recorded(report))
-        properties = [PropertyResult(name, one["failed"], one["robustness"]) for name, one in data["properties"].items()]
-        causes = tuple(map(_cause, data["causes"][:MOST_CAUSES]))
-        return CampaignResult(data["runs"], data["failed"], data["pass_rate"], tuple(data["interval"]), tuple(properties), causes)
+        return CampaignResult.of(json.loads(read_recorded(report)))
     return None
-
-
-def _cause(one: Mapping[str, Any]) -> FailureCause:
-    files = one["files"]
-    return FailureCause(one["what"], one["where"], one["count"], files.get("session"), files.get("timeline"))
