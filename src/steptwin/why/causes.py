@@ -188,11 +188,10 @@ class Causes:
     def _of_change(self, signal: str, change: Change) -> FoundCause:
         owner, _, terminal = signal.partition(".")
         fault = self.fault(owner, change, None if owner in self.parts else terminal)
-        if fault is not None:
-            return fault
-        cleared = self._cleared(signal, change)
-        if cleared is not None:
-            return cleared
+        ended = self._cleared(signal, change) if fault is None else fault
+        if ended is not None:
+            older = (one for one in self._older_fault(signal, change.time) if one.link.root != ended.link.root)
+            return ended._replace(along=(*ended.along, *older))
         if owner in self.parts:
             return self.elements.of_inputs(owner, change, signal)
         if owner in self._world.controllers:
@@ -222,6 +221,13 @@ class Causes:
         acts = self.log.acts_at(change.time, change.order) if held is not None else ()
         act = next((act for act in acts if held is not None and act.what == do.ClearFault(held.fault)), None)
         return None if act is None else acted(act)
+
+    def _older_fault(self, signal: str, at: Nanos) -> Iterator[Cause]:
+        """The fault that holds a signal again since a newer one ended at a moment."""
+        hold, before = self.log.hold(signal, at), self.log.hold(signal, at - 1)
+        now, then = (None if one is None else one.held for one in (hold, before))
+        if now is not None and then is not None and now.fault != then.fault:
+            yield self.holding.acting(now.fault, at)
 
     def fault_link(self, record: TraceRecord) -> ChainLink:
         """Link of a record of a fault."""

@@ -100,10 +100,13 @@ class HoldingCauses:
         acting = [one for one in there if not one.fault.kind.effect.holds and one.name in faults.acts]
         acting = [one.name for one in acting if not kinds or one.fault.kind.name in kinds]
         if len(acting) == 1 and faults.acts[acting[0]].first <= at:
-            link = self.fault_link(acting[0], at)
-            act = self._all.fault_root(acting[0], at).by
-            place = Place(link.time) if act is None else Place(link.time, act.order, 1)
-            yield Cause(link, place, nothing if act is None else lambda: covered(acted(act), Cover.FAULT), Cover.FAULT)
+            yield self.acting(acting[0], at)
+
+    def acting(self, name: str, at: Nanos) -> Cause:
+        """A fault that has acted by a moment, with the action that set it."""
+        link, act = self.fault_link(name, at), self._all.fault_root(name, at).by
+        place = Place(link.time) if act is None else Place(link.time, act.order, 1)
+        return Cause(link, place, nothing if act is None else lambda: covered(acted(act), Cover.FAULT), Cover.FAULT)
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
         """A fault that has acted by a moment, as a cause: when it began, or acted first, where no record says that it began."""

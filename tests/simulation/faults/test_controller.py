@@ -657,9 +657,9 @@ def test_of_several_stuck_faults_the_newest_that_lasts_decides(pin: str) -> None
     by = ["one", "two", "three", "two", "two", "two", "two", "four", "four", None]
     assert seen == [(1.0 if name in ("one", "three", None) else 0.0, name) for name in by]
     assert [str(record.value) for record in world.trace if record.kind == "fault" and record.time >= SECOND // 2] == [
-        "it ends, but fault two lasts",
+        f"it ends, but fault two keeps {pin} at 0",
         f"{pin} is stuck at 0",
-        "it ends, but fault four lasts",
+        f"it ends, but fault four keeps {pin} at 0",
         f"{pin} is free",
     ]
 

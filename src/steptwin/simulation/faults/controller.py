@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message, text_of
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive, MotionController
-from steptwin.simulation.faults.active import ANOTHER_LASTS, ActiveFault, Faults, HeldLevel
+from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.faults.table import Fault, FaultKind, Occasion
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -96,6 +96,7 @@ PIN_WITH_ITS_CONTROLLER = Message(
 )
 UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {controller!r} has {names}")
 LEVEL_OF_AN_OUTPUT = Message("simulation.level-of-an-output", "fault {name}: value = {value:g}: an output is 0 or 1")
+PIN_STAYS_STUCK = Message("simulation.pin-stays-stuck", "it ends, but fault {other} keeps {pin} at {level:g}")
 PIN_IS_STUCK = Message("simulation.pin-is-stuck", "{pin} is stuck at {level:g}")
 PIN_IS_FREE = Message("simulation.pin-is-free", "{pin} is free")
 SLAVE_IS_MUTE = Message("simulation.slave-is-mute", "a slave of its Modbus master does not answer")
@@ -442,7 +443,11 @@ class FaultyController(Stateful):
             active.due = None
             self._faults.does(active, None, now)
             self._let_act(pin, others, now)
-            self.report(active, now, ANOTHER_LASTS(other=others[-1].fault) if others else PIN_IS_FREE(pin=pin))
+            if others:
+                other, kept = others[-1]
+                self.report(active, now, PIN_STAYS_STUCK(other=other, pin=pin, level=kept))
+            else:
+                self.report(active, now, PIN_IS_FREE(pin=pin))
 
     def _others(self, pin: str, active: ActiveFault) -> tuple[HeldLevel, ...]:
         """Level at which the other faults hold a pin."""
