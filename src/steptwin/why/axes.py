@@ -27,6 +27,8 @@ from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
+FOLLOWS_ENCODER = Message("why.follows-encoder", "{axis} follows its encoder, which {name} turns")
+CHANGED_UNDER_WAY = Message("why.changed-under-way", "the motion of {axis}, which was under way, changed")
 STOPPED = Message("why.stopped", "{axis} stopped")
 PULSES_STOPPED = Message("why.pulses-stopped", "the pulses of {axis} stopped")
 AS = Message("why.as", "{what}, as {condition}")
@@ -93,8 +95,7 @@ class AxisCauses:
         elif _brakes(profile):
             text, cover = BEGAN_TO_BRAKE(axis=shown), Cover.MOTION
         else:
-            began, cover = self._began(controller, plan), Cover.MOTION
-            text = _under_way(shown, began, plan.time)
+            text, cover = self._under_way(controller, plan, shown), Cover.MOTION
 
         def planned() -> FoundCause:
             found = self._all.controllers.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
@@ -173,6 +174,16 @@ class AxisCauses:
         there = self._all.of(began) if self._log.was_before(plan) else None
         earlier = None if there is None else next(iter(there.log.plans_in_force(controller, record.subject, began)), None)
         return began if there is None or earlier is None else there.axes._began(controller, earlier)
+
+    def _under_way(self, controller: str, plan: Change, shown: str) -> MessageText:
+        """A motion that goes on, in words: an axis begins to move only where it was at rest before."""
+        began, axis = self._began(controller, plan), self._log.record(plan).subject
+        if began != plan.time:
+            return MOTION_CHANGED(axis=shown, time=began / SECOND)
+        before = next(iter(self._log.plans_in_force(controller, axis, plan.time, plan.order)), None)
+        profile = None if before is None else profile_of(self._log.record(before).plan())
+        moved = profile is not None and profile.start < plan.time and profile.moving(plan.time)
+        return CHANGED_UNDER_WAY(axis=shown) if moved else BEGAN_TO_MOVE(axis=shown)
 
     def _acted_by(self, controller: str, axis: str, one: Resource, plan: Change) -> FoundCause:
         """Cause of something by which the command of a plan acts."""
@@ -504,7 +515,18 @@ class AxisCauses:
         is_over = found is None or found.place.time < time
         if inputs is None or not number or not is_over or not inputs.is_followed(self._world.controller(controller), int(number)):
             return found
-        return self._turned(controller, number, time, before) or found
+        turned, axis = self._turned(controller, number, time, before), self.driven(controller, number)
+        follows = None if axis is None else self._encoder_of(axis)
+        here = Place(time, before, -1)
+        if turned is None or follows is None or turned.place >= here:
+            return turned or found
+        link = ChainLink(time, controller, FOLLOWS_ENCODER(axis=axis, name=follows))
+        return Cause(link, here, lambda: covered(turned, Cover.MOTION))
+
+    def _encoder_of(self, axis: str) -> str | None:
+        """The name of what turns the encoder of an axis instead of the axis; None for its own."""
+        follows = getattr(self._world.axes[axis].spec.encoder, "follows", None)
+        return follows if isinstance(follows, str) else None
 
     def _turned(self, controller: str, number: str, until: Nanos, before: int) -> FoundCause:
         """The thing other than its own axis that turned an encoder last by a moment: another axis, a belt, a motor, a hand."""
@@ -517,7 +539,7 @@ class AxisCauses:
         if not found:
             self._log.lack()
         axis = self.driven(controller, number)
-        follows = None if axis is None else getattr(self._world.axes[axis].spec.encoder, "follows", None)
+        follows = None if axis is None else self._encoder_of(axis)
         if follows is not None and follows in self._world.axes:
             found.append(self.moved(follows, until, before))
         elif follows is not None:
@@ -528,8 +550,7 @@ class AxisCauses:
         """The motion of its own axis that turned an encoder last; None for one that something else, or nothing, turns."""
         axis = self.driven(controller, number)
         if axis is not None:
-            is_own = getattr(self._world.axes[axis].spec.encoder, "follows", None) is None
-            return self.moved(axis, until, before) if is_own else None
+            return self.moved(axis, until, before) if self._encoder_of(axis) is None else None
         acts = self._log.acts_before(until, before)
         coupled = (act.what for act in acts if isinstance(act.what, do.Couple) and act.what.controller == controller)
         coupling = next((what.coupling for what in coupled if str(what.axis) == number), None)
@@ -550,11 +571,6 @@ class AxisCauses:
         if not profile.segments:
             return plan.time, plan.time
         return math.inf if profile.end is None else profile.end, plan.time
-
-
-def _under_way(axis: str, began: Nanos, planned: Nanos) -> MessageText:
-    """A motion that goes on, in words; ``planned``: when it was planned as it is."""
-    return BEGAN_TO_MOVE(axis=axis) if began == planned else MOTION_CHANGED(axis=axis, time=began / SECOND)
 
 
 def _brakes(profile: Profile) -> bool:
