@@ -38,13 +38,16 @@ def _break(active: ActiveFault, output: VoltageOutput, begins: bool, now: Nanos)
     return (WIRE_IS_BROKEN if begins else WIRE_IS_WHOLE)(name=output.name)
 
 
-READS_WRONG = Message("simulation.reads-wrong", "{name} reads {offset:+g} V")
+READS_TOO_HIGH = Message("simulation.reads-too-high", "{name} reads {volts:g} V too high")
+READS_TOO_LOW = Message("simulation.reads-too-low", "{name} reads {volts:g} V too low")
 READS_RIGHT = Message("simulation.reads-right", "{name} reads right again")
 
 
 def _drift(active: ActiveFault, output: VoltageOutput, begins: bool, now: Nanos) -> str:
     output.offset = active.fault.number("volts") if begins else 0.0
-    return READS_WRONG(name=output.name, offset=output.offset) if begins else READS_RIGHT(name=output.name)
+    if not begins:
+        return READS_RIGHT(name=output.name)
+    return (READS_TOO_LOW if output.offset < 0.0 else READS_TOO_HIGH)(name=output.name, volts=abs(output.offset))
 
 
 def _is_wrong(active: ActiveFault, output: VoltageOutput, now: Nanos) -> bool:
