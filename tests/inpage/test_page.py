@@ -397,7 +397,8 @@ def test_a_hidden_tab_goes_on_or_pauses_as_chosen(demo: Demo) -> None:
     page.evaluate(HIDE, True)
     expect(time_of(page)).to_contain_text("paused")
     page.evaluate(HIDE, False)
-    expect(time_of(page)).to_contain_text("live")  # the choice is kept: other tabs have it
+    expect(time_of(page)).to_contain_text("live")
+    choice.uncheck()
 
 
 def test_a_campaign_is_ended_in_the_midst_and_has_the_results_of_cpython(demo: Demo, tmp_path: Path) -> None:
@@ -502,6 +503,8 @@ def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo, mon
     expect(time_of(demo.page)).to_contain_text("live", timeout=LOADING_MS)
     button(demo.page, "Share").click()
     expect(demo.page).to_have_url(re.compile("#world="))
+    show(demo.page, "Time")
+    demo.page.get_by_label("Pause while this tab is hidden").check()  # it is kept: other tabs have it
     other = demo.tab()
 
     # All of the page is stored meanwhile: this tab has no network.
