@@ -113,3 +113,28 @@ def test_a_pair_that_may_overlap_is_no_warning() -> None:
 def test_what_moves_without_a_known_end_is_not_judged() -> None:
     text = MACHINE.replace("travel = [0, 200]\n", "") + body("head", "x", "[0, 0, 0]") + body("post", "", "[15, 0, 90]")
     assert diagnose("m.toml", text, no_files).findings == []
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        (
+            body("plate", "", "", "[200, 200, 20]") + body("post", "", "[0, 0, 22.5]"),
+            ["post hangs in the air, 2.5 mm above plate"],
+        ),
+        (body("plate", "", "", "[200, 200, 20]") + body("post", "", "[0, 0, 20]"), []),
+        # What it stands on is not described, or is at its side.
+        (body("plate", "", "", "[200, 200, 20]") + body("post", "", "[0, 0, 26]"), []),
+        (body("plate", "", "", "[200, 200, 20]") + body("post", "", "[110, 0, 22.5]"), []),
+        (body("plate", "", "", "[200, 200, 20]") + body("arm", "", "[0, 0, 22.5]") + body("mast", "", "[20, 0, 20]"), []),
+        # It moves against what is below it, or with that.
+        (body("plate", "", "[0, 0, 77.5]", "[200, 200, 20]") + body("slide", "x", ""), []),
+        (
+            body("slide", "x", "") + body("head", "x", "[0, 0, 21]"),
+            ["head hangs in the air, 1 mm above slide"],
+        ),
+        (body("plate", "", "", "[200, 200, 20]") + body("hand", "", "[0, 0, 21]", more='when = "time > 1"\n'), []),
+    ],
+)
+def test_bodies_that_hang_just_above_one(text: str, messages: list[str]) -> None:
+    assert [message for message, _ in warnings(text)] == messages

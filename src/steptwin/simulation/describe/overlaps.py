@@ -1,8 +1,9 @@
-"""Warnings about bodies and nests that lie in others when the world begins, where nobody looks for contacts of them."""
+"""Warnings about bodies and nests that lie in bodies when the world begins, where nobody looks for their contacts, or that hang
+just above one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations, product
 
 from steptwin.controller import Nanos
@@ -20,9 +21,9 @@ from steptwin.simulation.components.nesttable import NestSpec
 from steptwin.simulation.components.workpieces import WORKPIECES
 from steptwin.simulation.space.bodies import OVERLAP_NM, Body, Box, Placed, contains, gap
 from steptwin.simulation.space.contacts import Pair
-from steptwin.simulation.space.frames import HERE, NM_PER_MM, Frame, Joint, Z, along
+from steptwin.simulation.space.frames import HERE, NM_PER_MM, Frame, Joint, X, Y, Z, along
 from steptwin.simulation.space.pieces import Range
-from steptwin.simulation.space.sweeps import meet, swept
+from steptwin.simulation.space.sweeps import ROUNDING_NM, Sweep, meet, swept
 from steptwin.simulation.toml.reader import TomlText
 
 DOUBTFUL = "D011"
@@ -33,6 +34,9 @@ LIES_INSIDE = Message("simulation.lies-inside", "{one} lies inside {other}")
 STANDS_IN = Message("simulation.stands-in", "{one} stands {by:g} mm deep in {on}, which it is on")
 MAY_OVERLAP = Message("simulation.may-overlap-hint", "if they may, a [[collision]] with except = [['{one}', '{other}']] says so")
 GIVE_AT = Message("simulation.give-at-hint", "without at it is at the middle of the lower face of {on}")
+HANGS = Message("simulation.hangs", "{one} hangs in the air, {by:g} mm above {other}")
+LEAST_AIR_NM = 5_000_000
+"""Below so much air something was meant to stand there. Above it, what it stands on may just not be described."""
 NEST_INSIDE = Message("simulation.nest-inside", "workpieces in {nest} are inside {body}, whose top is {by:g} mm above it")
 
 
@@ -56,6 +60,8 @@ def check_overlaps(text: TomlText, objects: BuiltObjects) -> None:
     for nest in objects.described.of(NEST):
         for name in lasting:
             _check_nest(text, frames, nest, every[name])
+    for its in lasting.values():
+        _check_air(text, frames, its, around)
 
 
 def _present(frame: Frame, joint: Joint) -> Range:
@@ -91,6 +97,26 @@ def _check_pair(text: TomlText, frames: Frames, one: tuple[BodySpec, Body], othe
         if contains(around, its):
             text.warn(_place(text, spec), DOUBTFUL, LIES_INSIDE(one=spec.name, other=outer.name))
             return
+
+
+def _check_air(text: TomlText, frames: Frames, spec: BodySpec, around: Mapping[str, Sweep]) -> None:
+    """Warn of a body that touches none, and is just above one that it does not move against."""
+    its = around[spec.name]
+    others = {name: other for name, other in around.items() if name != spec.name}
+    if any(all(_is_beside(its, other, axis, ROUNDING_NM) for axis in (X, Y, Z)) for other in others.values()):
+        return
+    above = {
+        name: its.low[Z] - other.high[Z] for name, other in others.items() if all(_is_beside(its, other, k, 0.0) for k in (X, Y))
+    }
+    near = {name: gap for name, gap in above.items() if 0.0 < gap <= LEAST_AIR_NM}
+    below = min(near, key=near.__getitem__, default=None)
+    if below is not None and not frames.between(frames[spec.name].frame, frames[below].frame):
+        text.warn(_place(text, spec), DOUBTFUL, HANGS(one=spec.name, other=below, by=near[below] / NM_PER_MM))
+
+
+def _is_beside(one: Sweep, other: Sweep, axis: int, margin: float) -> bool:
+    """Whether they have a place along an axis in common, or one within a margin."""
+    return one.low[axis] < other.high[axis] + margin and other.low[axis] < one.high[axis] + margin
 
 
 def _place(text: TomlText, spec: BodySpec | NestSpec) -> tuple[str | int, ...]:

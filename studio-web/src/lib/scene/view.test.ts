@@ -2,9 +2,9 @@ import { expect, test } from "vitest";
 import type { Model } from "../state/model";
 import type { Scene } from "./poses";
 import { Stage } from "./stage";
-import type { Solid } from "./builder";
+import { dot, plus, times, type Solid } from "./builder";
 import { facesOf } from "./faces";
-import { frameOf, Order, placeAlong, VIEWS, type ViewName } from "./view";
+import { frameOf, Order, placeAlong, standOf, VIEWS, type ViewName } from "./view";
 
 type Box = readonly [name: string, at: readonly number[], size: readonly number[], on?: string];
 
@@ -100,5 +100,28 @@ test("the end of a cylinder that is seen fills its outline, whichever way it lie
       .slice(0, -1)
       .map((one) => turns(`${one}Z`));
     expect(others).toEqual([outline]);
+  }
+});
+
+test("a picture in central perspective has all in it, and not more room than it needs", () => {
+  const { extents } = stageOf([
+    ["bed", [0, 0, 0], [1000, 400, 20]],
+    ["post", [450, 100, 20], [30, 30, 300]],
+  ]);
+  const slopes = [0.3, 0.2] as const;
+  for (const { right, up, near } of Object.values(VIEWS)) {
+    const { middle, far } = standOf({ right, up, near }, extents, slopes);
+    const seen = extents.flatMap(({ low, high }) =>
+      [low[0], high[0]].flatMap((x) =>
+        [low[1], high[1]].flatMap((y) =>
+          [low[2], high[2]].map((z) => {
+            const from = plus([x, y, z], times(middle, -1));
+            const deep = far - dot(near, from);
+            return Math.max(Math.abs(dot(right, from)) / slopes[0], Math.abs(dot(up, from)) / slopes[1]) / deep;
+          }),
+        ),
+      ),
+    );
+    expect(Math.max(...seen)).toBeCloseTo(1 / 1.12, 9);
   }
 });

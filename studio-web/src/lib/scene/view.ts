@@ -49,6 +49,25 @@ export function pageOf(view: View, extents: readonly Extent[]): [number, number,
   return [left - room, top - room, wide + 2 * room, tall + 2 * room];
 }
 
+/** What is looked at, and from how far away, so that all is in a picture of central perspective. `slopes`: of its edges, to the right
+ * and upwards. */
+export function standOf({ right, up, near }: View, extents: readonly Extent[], slopes: readonly [number, number]) {
+  const corners = extents.flatMap(({ low, high }) =>
+    Array.from({ length: 8 }, (_, n): Vector => [
+      n & 1 ? high[0] : low[0],
+      n & 2 ? high[1] : low[1],
+      n & 4 ? high[2] : low[2],
+    ]),
+  );
+  const along = [right, up, near].map((direction) => corners.map((corner) => dot(direction, corner)));
+  const [x = 0, y = 0, z = 0] = along.map((places) => (Math.min(...places) + Math.max(...places)) / 2);
+  const far = corners.map((_, n) => {
+    const [a = 0, b = 0, c = 0] = along.map((places) => places[n] as number);
+    return c - z + (1 + 2 * ROOM) * Math.max(Math.abs(a - x) / slopes[0], Math.abs(b - y) / slopes[1]);
+  });
+  return { middle: plus(times(right, x), times(up, y), times(near, z)), far: Math.max(...far) };
+}
+
 /** Of a direction that is nearly in the picture. */
 const FLAT = 0.01;
 const TOUCHING_MM = 0.01;

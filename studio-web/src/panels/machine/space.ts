@@ -32,7 +32,7 @@ import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Drawn } from "../../lib/scene/strand";
-import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
+import { standOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import { labelOf, type Marks } from "./drawing";
 
 /** The layer of what the camera does not see. */
@@ -60,7 +60,6 @@ export class Space {
   private revision = -1;
   private readonly lines = new LineBasicMaterial();
   private readonly looks = new Map<string, MeshStandardMaterial>();
-  private readonly middle = new Vector3();
   private readonly size: number;
   private readonly place = new Vector3();
   private isFollowing = false;
@@ -87,7 +86,6 @@ export class Space {
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     const { low, high } = stage.extent;
-    this.middle.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
     this.size = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     this.camera.up.set(0, 0, 1);
     this.camera.near = this.size / 100;
@@ -107,17 +105,15 @@ export class Space {
   /** From a side. */
   look(view: ViewName): void {
     this.view = view;
-    const { right, up, near } = VIEWS[view];
-    const [, , wide, tall] = frameOf({ right, up, near }, [this.stage.extent]);
+    const { near } = VIEWS[view];
     const half = Math.tan((ANGLE * Math.PI) / 360);
-    const [, , , deep] = frameOf({ right, up: near, near: up }, [this.stage.extent]);
-    const far = (0.5 * Math.max(tall, wide / this.camera.aspect)) / half + deep / 2;
-    this.controls.target.copy(this.middle);
+    const { middle, far } = standOf(VIEWS[view], this.stage.extents, [half * this.camera.aspect, half]);
+    this.controls.target.set(...middle);
     // Who looks straight down would have no direction that is up.
     this.camera.position
       .set(near[0], near[1] - (view === "top" ? 1e-4 : 0), near[2])
       .multiplyScalar(far)
-      .add(this.middle);
+      .add(this.controls.target);
     this.controls.update();
     this.isStale = true;
   }
