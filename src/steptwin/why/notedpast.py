@@ -69,13 +69,14 @@ class NotedPast:
         return other
 
     def behind(self, signals: Iterable[str], at: Nanos) -> set[str]:
-        """Signals, and those that drive one of them."""
+        """Signals, and those that drive one of them, as far as they have a part in its level."""
         waiting, seen = list(signals), set[str]()
         while waiting:
             name = waiting.pop()
             if name not in seen:
                 seen.add(name)
-                waiting += (*self.causes.drivers(name, at), *self.causes.elements.behind(name))
+                drivers = self.causes.holding.deciding(name, self.causes.drivers(name, at), at)
+                waiting += (*drivers, *self.causes.elements.behind(name))
         return seen
 
     def changeable(self, names: Sequence[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
