@@ -109,12 +109,15 @@ class Causes:
         when = since_before(self.log.before(signal).known_from) if since is None else SINCE(time=since / SECOND)
         driven: MessageText | str = ""
         if drivers:
-            driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers))
-            driven = OVER_INVERTED_WIRE(driven=driven) if self._is_inverted_wire(signal) else driven
+            driven = self._driven_by(signal, drivers)
         elif since is None:
             driven = self.undriven(signal) or ""
         how = self._as_it_is(signal, driven)
         return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=how)
+
+    def _driven_by(self, signal: str, drivers: Sequence[str]) -> MessageText:
+        driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers))
+        return OVER_INVERTED_WIRE(driven=driven) if self._is_inverted_wire(signal) else driven
 
     def _is_inverted_wire(self, signal: str) -> bool:
         """Whether an inverted wire drives an input of a controller or element."""
@@ -130,13 +133,16 @@ class Causes:
         return Cause(link, place, nothing, besides=partial(self._kept, signal, Place(time, order, number - 1)))
 
     def _kept(self, signal: str, place: Place) -> Iterator[Cause]:
-        """The contacts from the beginning that keep a signal as it has been from the beginning; of a switch of an axis what has
-        left that where it is."""
+        """The contacts and outputs from the beginning that keep a signal as it has been from the beginning; of an output what its
+        program has not come to; of a switch of an axis what has left that where it is."""
+        owner, _, pin = signal.partition(".")
         for name in self.holding.leaves(signal, place.time):
-            if name in self.contacts and name != signal and self.log.since(name, place.time) is None:
+            is_kept = name in self.contacts or name.partition(".")[0] in self._world.controllers
+            if is_kept and name != signal and self.log.since(name, place.time) is None:
                 yield self.unchanged(name, place)
-        owner = signal.partition(".")[0]
         found = self.axes.moved(owner, place.time, place.order) if owner in self._world.axes else None
+        if owner in self._world.controllers:
+            found = self.programs.before(owner, Resource(ResourceKind.PIN, pin), place.time)
         if found is not None:
             yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in (found, *found.along))
 
@@ -165,6 +171,8 @@ class Causes:
         if earlier is not None:
             return earlier
         value, place = self.log.level(signal, self.log.begin), place or Place(known.known_from)
+        drivers = self.drivers(signal, place.time) if how is None else ()
+        how = self._driven_by(signal, drivers) if drivers else how
         text = IS_SINCE(signal=signal, value=value, since=since_before(known.known_from), how=self._as_it_is(signal, how))
         link, by = ChainLink(place.time, signal.partition(".")[0], text), place._replace(number=place.number - 1)
         return (
