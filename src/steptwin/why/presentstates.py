@@ -119,7 +119,7 @@ class PresentStates:
         is_held = self._log.hold(name, self._at) is not None
         if not is_held:
             yield from self._ended(name) if owner in self._world.controllers else self._under_way(name)
-        others = () if owner == waits or is_held else (yield from self._not_written(name))
+        others = () if owner == waits or is_held else (yield from self._not_written(name, is_of_other=bool(waits)))
         drivers = self._causes.drivers(name, self._at)
         return (*self._causes.holding.deciding(name, drivers, self._at), *others)
 
@@ -215,8 +215,9 @@ class PresentStates:
             )
         return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
 
-    def _not_written(self, signal: str) -> _Links:
-        """Reason why a program has not changed an output that it can change; the supply that its controller lacks."""
+    def _not_written(self, signal: str, *, is_of_other: bool) -> _Links:
+        """Reason why a program has not changed an output that it can change; the supply that its controller lacks.
+        ``is_of_other``: another program waits for the output."""
         owner, _, pin = signal.partition(".")
         programs, at = self._causes.programs, self._at
         if owner not in self._world.controllers or self._causes.drivers(signal, at):
@@ -226,7 +227,22 @@ class PresentStates:
             return [supply]
         if programs.stands(owner, at) is not None and not programs.may_write(owner, pin):
             return ()
-        return (yield from self._before(owner, Resource(ResourceKind.PIN, pin)))
+        waiting, wanted = self._log.last_executed(owner, at), Resource(ResourceKind.PIN, pin)
+        if is_of_other and waiting >= 0 and programs.is_written(owner, wanted) and not programs.leads_to(owner, waiting, wanted):
+            yield from self._stands(owner, waiting)
+        return (yield from self._before(owner, wanted))
+
+    def _stands(self, controller: str, index: int) -> Iterator[ChainLink]:
+        """The end to which a program has come, or the wait at which it stands."""
+        here, programs = self._log.executed[controller][index], self._causes.programs
+        use = programs.use(controller, index)
+        if programs.stands(controller, self._at) is not None:
+            return
+        if programs.is_over(controller, index, self._at):
+            yield ChainLink(here.time, controller, programs.end(controller, index))
+        elif use.reads and self.waits(controller, use):
+            words = WAITS(controller=controller, statement=statement(self._log, here))
+            yield ChainLink(self._at, controller, words, is_stand=True)
 
     def _unreached(self, controller: str, index: int, wanted: Resource) -> Iterator[ChainLink]:
         """The statement that would change something, if no way leads there."""
