@@ -18,7 +18,7 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
-from steptwin.why.programs import NEVER_SET, OF_INTERRUPT, WAITS
+from steptwin.why.programs import NEVER_SET, OF_AWAITED_INTERRUPT, OF_INTERRUPT, WAITS
 from steptwin.why.sentences import statement, statement_at
 
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
@@ -176,7 +176,7 @@ class PresentStates:
     def _interrupts(self, controller: str, wanted: Resource) -> _Links:
         """The switches of the interrupts that change something, and who set them. Returns the events of those that are on."""
         events: list[_Asked] = []
-        for use, writing in self._causes.programs.interrupts(controller, wanted):
+        for use, label, writing in self._causes.programs.interrupts(controller, wanted):
             disabled = list(self._disabled(controller, use, writing)) if wanted not in use.acts_by else []
             if disabled:
                 yield from disabled
@@ -184,7 +184,11 @@ class PresentStates:
                     self._off.add((controller, writing))
                     events += yield from self._before(controller, switch)
                 continue
-            events += ((controller, one) for one in use.reads)
+            programs, events = self._world.programs[controller], [*events, *((controller, one) for one in use.reads)]
+            has_come = label in programs.deferred() or self._causes.programs.has_come(controller, label, self._at)
+            if not has_come and wanted not in use.acts_by:
+                words = OF_AWAITED_INTERRUPT(statement=statement_at(programs, writing), label=statement_at(programs, label))
+                yield ChainLink(self._at, controller, words)
             for switch in use.acts_by:
                 yield from self._switch(controller, switch)
         return events

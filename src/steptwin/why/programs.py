@@ -26,6 +26,7 @@ DECIDED = Message("why.decided", "{statement} decided: {next} came next")
 CAME = Message("why.came", "{statement} came")
 FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
 OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
+OF_AWAITED_INTERRUPT = Message("why.of-awaited-interrupt", "{statement} is executed by {label}, which has not come")
 NEVER_SET = Message("why.never-set", "nothing has set {name}")
 NOT_STARTED = Message("why.not-started", "nothing has started the program")
 HELD = {
@@ -177,15 +178,23 @@ class ProgramCauses:
             return False
         return any(executed.location.number in one for one in self._handlers(controller, executed.location.text))
 
-    def interrupts(self, controller: str, wanted: Resource) -> Iterator[tuple[StatementUse, StatementLocation]]:
-        """The interrupts in which a statement changes something, each with the first such statement."""
+    def interrupts(
+        self, controller: str, wanted: Resource
+    ) -> Iterator[tuple[StatementUse, StatementLocation, StatementLocation]]:
+        """The interrupts in which a statement changes something, each with its label and the first such statement."""
         programs = self._world.programs[controller]
         for text in programs.texts:
             for handler in self._handlers(controller, text):
                 places = [StatementLocation(text, number) for number in handler]
                 writing = next((one for one in places[1:] if wanted in programs.use(one).writes), None)
                 if writing is not None:
-                    yield programs.use(places[0]), writing
+                    yield programs.use(places[0]), places[0], writing
+
+    def has_come(self, controller: str, label: StatementLocation, at: Nanos) -> bool:
+        """Whether an interrupt has come by a moment."""
+        executed, labels = self._log.last_executed(controller, at) + 1, (label,)
+        is_noted = self._log.last_of(controller, labels, executed) is not None
+        return is_noted or self._log.executed_before(controller, labels) is not None
 
     def switched(self, controller: str, wanted: Resource, at: Nanos) -> Iterator[tuple[str, Cause]]:
         """The switches, written since, of the interrupt that changed something last and would have changed it again by a moment;

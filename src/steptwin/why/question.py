@@ -14,6 +14,7 @@ from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.attempts import NOTHING_HAS_COMMANDED
@@ -318,7 +319,24 @@ class Why:
         came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
         states = [] if came else list(present.interrupted(controller, wanted))
         since, off = None if last is None else last.place.time, (yield from self._switched_off([(controller, wanted)], at))
-        return self._after(present, states, (yield from self._answer(text, at, state, since, along(last, off))))
+        events = self._awaited_events(controller, wanted, other)
+        return self._after(present, states, (yield from self._answer(text, at, state, since, along(last, [*off, *events]))))
+
+    def _awaited_events(self, controller: str, wanted: Resource, other: Simulation) -> Iterator[Cause]:
+        """The last changes of what the interrupts wait for that would change something, are on and have not come. ``other``: a
+        world in the state of the moment."""
+        programs, at = self.causes.programs, other.now
+        index = self.log.last_executed(controller, at) + 1
+        for use, label, _ in programs.interrupts(controller, wanted):
+            is_on = all(other.programs[controller].read(switch.name, at) for switch in use.acts_by)
+            if not is_on or programs.has_come(controller, label, at):
+                continue
+            switched = [programs.resource(controller, switch, index, at) for switch in use.acts_by]
+            since = max((one.place for one in switched if one is not None), default=Place(-1))
+            for one in use.reads:
+                found = programs.resource(controller, one, index, at)
+                if found is not None and found.place > since:
+                    yield found._replace(cover=Cover.LEVEL)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when it stands."""
