@@ -680,6 +680,7 @@ def test_a_count_leads_to_the_interrupt_in_which_it_is_made(counts: World) -> No
         "go became 1, a contact of c.IN1",
         "script hand: presses go",
         "line 3 `CFGINT_IN1 = RIS` was executed",
+        "line 2 `n = 0` was executed, which gave n its value before",
         "the program started",
     ]
 

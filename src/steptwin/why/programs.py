@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -20,6 +21,7 @@ WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
 WAITS = Message("why.waits", "{controller} waits at {statement}")
 ENDED = Message("why.ended", "{statement} ended")
+GAVE_BEFORE = Message("why.gave-before", "{what}, which gave {name} its value before")
 DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
 WAS_OVER = Message("why.was-over", "{statement} did not wait")
 DECIDED = Message("why.decided", "{statement} decided: {next} came next")
@@ -260,6 +262,17 @@ class ProgramCauses:
             value = None if is_written else self.resource(controller, one, index, here.time, here.order)
             if value is not None:
                 yield value._replace(cover=Cover.LEVEL)
+            elif is_written and one.kind is ResourceKind.VALUE:
+                yield from self._made_of(controller, one, index)
+
+    def _made_of(self, controller: str, value: Resource, index: int) -> Iterator[Cause]:
+        """The last change of a value of which an executed statement makes its next one; not what was before that, such as the
+        earlier counts of a counter."""
+        here = self._log.executed[controller][index]
+        found = self.resource(controller, value, index, here.time, here.order)
+        if found is not None:
+            text = GAVE_BEFORE(name=value.name, what=found.link.text)
+            yield found._replace(link=replace(found.link, text=text), cover=Cover.LEVEL, besides=tuple)
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
         """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
