@@ -125,6 +125,8 @@ def test_what_was_before_the_past_that_is_kept_is_not_known(run: Run) -> None:
         await asyncio.sleep(3)
         assert (await rig.why("OUT1"))["text"].splitlines() == [
             "cell.OUT1 is 1, since before 2.000000 s (at 5 s)",
+            "    5.000000 s  cell       cell.OUT1 is 1 since before 2.000000 s",
+            "    5.000000 s  cell       no way leads from line 4 `WAIT IN2 = ON` to line 2 `OUT1 = ON`",
             "                (what was before 2.000000 s is not known)",
         ]
         assert (await rig.why("cell"))["text"].splitlines() == [

@@ -745,5 +745,6 @@ def test_an_element_that_acts_on_a_level_from_the_beginning() -> None:
     assert [link.text for link in answer.links] == [
         "z.extended became 1",
         "n.out is 1 from the beginning, on which z has acted since",
+        "c.OUT1 is 0 from the beginning, which nothing has set",
     ]
     assert answer.broken is None
