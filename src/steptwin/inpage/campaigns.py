@@ -57,7 +57,7 @@ class PageCampaigns:
         self._machine = machine
         self._first = text
         self._given: Mapping[str, object] = {}
-        """What the results are of."""
+        """Text and files of the campaign that gave the results."""
         self._known: list[str] = []
         """Results: `steptwin.campaign.results.StoredCase.to_text`."""
         self._state = _begin(text)
@@ -93,7 +93,7 @@ class PageCampaigns:
             raise Refusal(CAMPAIGN_IS_RUNNING(name=campaign))
 
     def take(self, news: str) -> None:
-        """What `steptwin.inpage.jobs.JobsPage.tell` was given."""
+        """Take a text that `steptwin.inpage.jobs.JobsPage.tell` was given."""
         if not self._state.is_running:
             return
         found = json.loads(news)

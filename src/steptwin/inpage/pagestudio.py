@@ -46,7 +46,7 @@ class PageStudio:
         self.world = world
         self.branches: dict[int, PageStudio] = {}
         self.numbers = count(1)
-        """Of branches."""
+        """Numbers of the branches that are made from here."""
         self.begin: Nanos = world.now
         self._stands = False
         """Whether time stands because it is not shown."""

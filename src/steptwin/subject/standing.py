@@ -187,7 +187,7 @@ class Standing:
                 yield faults.acts[fault.name].last
 
     def _shown_by(self, name: str) -> str:
-        """What shows how an element is: its first output, else its first number; empty where it has neither."""
+        """The signal that shows how an element is: its first output, else its first number; empty where it has neither."""
         objects = self._world.objects
         terminals = objects.terminals.get(name)
         named = () if terminals is None else terminals.outputs

@@ -339,7 +339,7 @@ def _stands(fitted: BuiltAxis, now: Nanos) -> Stands | None:
 
 
 def is_beside(fitted: BuiltAxis, lost: int) -> Stands | None:
-    """What stands of an axis that has lost so many pulses since its controller knew where it is."""
+    """The state of an axis that has lost so many pulses since its controller knew where it is; None where there are none."""
     return Stands(HAS_LOST(distance=fitted.units(lost), unit=fitted.scale.unit), signal=LOST) if lost else None
 
 

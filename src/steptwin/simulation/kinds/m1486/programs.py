@@ -242,7 +242,7 @@ class ChipPrograms:
         return use_of(self._text.commands[location.number], self._operands())
 
     def _operands(self) -> ChipState:
-        """What calculations may read besides their numbers: by a function that is ON, or a command of the text."""
+        """State that calculations may read besides their numbers: by a function that is ON, or a command of the text."""
         switched = {command.number for command in self._text.commands if command.use.level}
         on = {number for number in _OPERAND_OF if number in switched or self._chip.unit.on(number)}
         return reduce(or_, (_OPERAND_OF[number] for number in on), NOTHING)

@@ -26,7 +26,7 @@ _EVERYTHING = range(1 << 16)
 """A jump that depends on something decides about what comes after it, wherever that is."""
 _CALCULATIONS = frozenset("+-*/")
 OPERANDS = ChipState.LINES | ChipState.REGISTERS
-"""What calculations read while functions 46 and 58 are ON."""
+"""State that calculations read while functions 46 and 58 are ON."""
 _KEPT = ChipState.FLAGS | ChipState.CARRY
 
 
