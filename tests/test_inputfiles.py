@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from steptwin import inputfiles
 from steptwin.errors import Misuse
 from steptwin.inputfiles import MOST_BYTES, MOST_RECORDED_VALUES, read_bytes, read_recorded
 
@@ -45,8 +44,7 @@ def test_a_recorded_file_is_utf8(file: Path) -> None:
         read_recorded(file)
 
 
-def test_a_recorded_file_has_at_most_so_many_bytes(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inputfiles, "MOST_RECORDED_BYTES", 10)
+def test_a_recorded_file_has_at_most_so_many_bytes(file: Path) -> None:
     file.write_bytes(b"[1, 2, 3, 4]")
     with pytest.raises(Misuse, match="it has 12 bytes; permitted are at most 10"):
-        read_recorded(file)
+        read_recorded(file, most=10)

@@ -88,7 +88,7 @@ def frame(page: Page, depth: int = 0) -> Locator:
 
 
 def variable(page: Page, name: str) -> Locator:
-    return page.get_by_role("table", name="Variables").get_by_role("row").filter(has_text=name).get_by_role("cell")
+    return page.get_by_role("table", name="Variables").get_by_role("row").filter(has_text=name).get_by_role("cell").first
 
 
 def value(page: Page, name: str) -> Locator:
