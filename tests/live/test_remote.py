@@ -161,3 +161,11 @@ def test_a_twin_without_local_sockets_is_found_by_its_announcement(monkeypatch: 
     monkeypatch.setattr(remote, "HAS_LOCAL_SOCKETS", False)
     assert asked(None, do.Note("a"), "one") == {"note": "a"}
     assert list(own_directory.iterdir()) == []
+
+
+def test_a_step_is_answered_when_its_time_has_passed() -> None:
+    """A twin answers after a part of a long one, and says how far it has to go on."""
+    done = asked(None, command.Advance(duration=9), "one")
+    assert "to_ns" not in done
+    assert [event["number"] for event in done["events"]] == list(range(200, 1200))
+    assert done["missed"] == 3 + 4 + 200

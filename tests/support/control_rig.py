@@ -22,7 +22,8 @@ from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions
 
 
 class Desk:
-    """A subject that is only asked: notes come back, one of them later, some are refused, one breaks it."""
+    """A subject that is only asked: notes come back, one of them later, some are refused, one breaks it; a step
+    to 9 has two parts."""
 
     def __init__(self) -> None:
         self.description = Description("desk", ())
@@ -43,6 +44,10 @@ class Desk:
                 return Result({"note": text}, 5, self.done)
             case command.Pause():
                 return Result("x" * 1_000_000, 5, self.done)
+            case command.Advance(9):
+                return Result({"events": [{"number": one} for one in range(600)], "missed": 3, "to_ns": "9"}, 5, self.done)
+            case command.Advance(None, 9):
+                return Result({"events": [{"number": one} for one in range(600, 1200)], "missed": 4}, 9, self.done)
         return Result(None, 5, self.done)
 
     def read(self, *points: str) -> tuple[Reading, ...]:

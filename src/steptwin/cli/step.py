@@ -11,7 +11,7 @@ import typer
 
 from steptwin.cli.device import Json, Twin
 from steptwin.cli.optiongroups import grouped
-from steptwin.cli.selected import ask_twin
+from steptwin.cli.selected import selected
 from steptwin.cli.worldtime import print_time
 from steptwin.files.worldoptions import ShownOptions
 
@@ -32,32 +32,31 @@ def command(
     """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
     from steptwin.simulation.world.records import ALL, read_selection
-    from steptwin.subject.commands import Advance, Describe
-    from steptwin.subject.contract import read_description
+    from steptwin.subject.commands import Advance
     from steptwin.subject.events import read_event
     from steptwin.subject.payloads import STEP_KINDS, named_in
 
-    selection = ALL
-    if shown.given():
-        world = read_description(ask_twin(twin, Describe()))
-        parts = (*world.controllers, *world.axes, *world.elements, *world.lines)
-        selection = read_selection(shown.of, shown.show, (*(part.name for part in parts), *world.buttons), sorted(STEP_KINDS))
     wanted = Advance(None if duration is None else parse_duration(duration, "step"), until=until)
+    selection = ALL
     events: list[dict[str, Any]] = []
-    while True:
-        there = ask_twin(twin, wanted)
-        if json:
-            events += there["events"]
-        else:
+    there: dict[str, Any] = {}
+    with selected(twin) as chosen:
+        if shown.given():
+            world = chosen.subject.description
+            parts = (*world.controllers, *world.axes, *world.elements, *world.lines)
+            names = (*(part.name for part in parts), *world.buttons)
+            selection = read_selection(shown.of, shown.show, names, sorted(STEP_KINDS))
+        for part in chosen.subject.advance(wanted):
+            there = part.value
+            if json:
+                events += there["events"]
+                continue
             for event in there["events"]:
                 found = read_event(event)
                 if selection.takes(found.kind, (found.controller, *named_in(found.payload))):
                     typer.echo(str(found))
             if there["missed"]:
                 typer.echo(f"... and {there['missed']} more", err=True)
-        if "to_ns" not in there:
-            break
-        wanted = Advance(to=int(there["to_ns"]), until=until)
     if not json:
         for name, statement in there["statements"].items():
             typer.echo(f"{name}: {statement}")

@@ -22,6 +22,7 @@ from steptwin.subject.contract import Description, Reading, Result, read_descrip
 from steptwin.subject.dispatch import raised
 from steptwin.subject.events import Event, read_event
 from steptwin.subject.subscriptions import EventBatch, Filter, Subscription
+from steptwin.subject.time import MOST_SHOWN
 from steptwin.system import reason
 
 LONGEST_ANSWER = 64 << 20
@@ -136,7 +137,22 @@ class RemoteSubject:
         return tuple(Reading(**reading) for reading in self.do(command.ReadPoints(points)).value)
 
     def do(self, wanted: command.Command) -> Result:
-        return self._ask(wanted, next(self._ids))
+        if not isinstance(wanted, command.Advance):
+            return self._ask(wanted, next(self._ids))
+        parts = list(self.advance(wanted))
+        events = [event for part in parts for event in part.value["events"]]
+        missed = sum(part.value["missed"] for part in parts) + max(0, len(events) - MOST_SHOWN)
+        return parts[-1]._replace(value={**parts[-1].value, "events": events[-MOST_SHOWN:], "missed": missed})
+
+    def advance(self, wanted: command.Advance) -> Iterator[Result]:
+        """A step in parts, each with its own events. A twin serves others between them, so it answers after a tenth of a second
+        and gives the moment to which the step has to go on."""
+        while True:
+            part = self._ask(wanted, next(self._ids))
+            yield part
+            if "to_ns" not in part.value:
+                return
+            wanted = command.Advance(to=int(part.value["to_ns"]), until=wanted.until)
 
     def subscribe(self, what: Filter, bound: int) -> Subscription:
         subscription, _ = self.subscribe_from_now(what, bound)
