@@ -24,6 +24,7 @@ from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unkno
 from steptwin.why.controllers import ControllerCauses, acted
 from steptwin.why.elements import ElementCauses, inputs
 from steptwin.why.holding import FAULT, HoldingCauses
+from steptwin.why.interrupts import InterruptCauses
 from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
@@ -67,7 +68,8 @@ class Causes:
         }
         circuits = world.objects.circuits.values()
         self.contacts = {one.channel: one for circuit in circuits for one in circuit.contacts if one.channel}
-        self.axes, self.attempts, self.programs = AxisCauses(self), Attempts(self), ProgramCauses(self)
+        self.axes, self.attempts = AxisCauses(self), Attempts(self)
+        self.programs, self.interrupts = ProgramCauses(self), InterruptCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
         self.workpieces = WorkpieceCauses(self)
         self.holding = HoldingCauses(self)

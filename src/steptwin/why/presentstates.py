@@ -18,7 +18,8 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
-from steptwin.why.programs import NEVER_SET, OF_AWAITED_INTERRUPT, OF_INTERRUPT, WAITS
+from steptwin.why.interrupts import OF_AWAITED_INTERRUPT, OF_INTERRUPT
+from steptwin.why.programs import NEVER_SET, WAITS
 from steptwin.why.sentences import statement, statement_at
 
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
@@ -176,7 +177,7 @@ class PresentStates:
     def _interrupts(self, controller: str, wanted: Resource) -> _Links:
         """The switches of the interrupts that change something, and who set them. Returns the events of those that are on."""
         events: list[_Asked] = []
-        for use, label, writing in self._causes.programs.interrupts(controller, wanted):
+        for use, label, writing in self._causes.interrupts.changing(controller, wanted):
             disabled = list(self._disabled(controller, use, writing)) if wanted not in use.acts_by else []
             if disabled:
                 yield from disabled
@@ -185,7 +186,7 @@ class PresentStates:
                     events += yield from self._before(controller, switch)
                 continue
             programs, events = self._world.programs[controller], [*events, *((controller, one) for one in use.reads)]
-            has_come = label in programs.deferred() or self._causes.programs.has_come(controller, label, self._at)
+            has_come = label in programs.deferred() or self._causes.interrupts.has_come(controller, label, self._at)
             if not has_come and wanted not in use.acts_by:
                 words = OF_AWAITED_INTERRUPT(statement=statement_at(programs, writing), label=statement_at(programs, label))
                 yield ChainLink(self._at, controller, words)
@@ -278,7 +279,11 @@ class PresentStates:
                 return ()
         elif owner in self._world.programs and not comes:
             is_missed = index >= 0 and programs.written(owner, wanted, index + 1) is None
-            if is_missed and not any(programs.interrupts(owner, wanted)) and not programs.decided_against(owner, wanted, at):
+            if (
+                is_missed
+                and not any(self._causes.interrupts.changing(owner, wanted))
+                and not programs.decided_against(owner, wanted, at)
+            ):
                 yield from self._unreached(owner, index, wanted)
             return (yield from self._interrupts(owner, wanted))
         if index < 0:

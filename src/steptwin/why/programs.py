@@ -12,10 +12,10 @@ from steptwin.datasheet import EventSeverity
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, along, covered, given, nothing, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing, unknown
 from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
-from steptwin.why.sentences import END_OF_PROGRAM, statement, statement_at
+from steptwin.why.sentences import END_OF_PROGRAM, statement
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
@@ -27,8 +27,6 @@ WAS_OVER = Message("why.was-over", "{statement} did not wait")
 DECIDED = Message("why.decided", "{statement} decided: {next} came next")
 CAME = Message("why.came", "{statement} came")
 FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
-OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
-OF_AWAITED_INTERRUPT = Message("why.of-awaited-interrupt", "{statement} is executed by {label}, which has not come")
 NEVER_SET = Message("why.never-set", "nothing has set {name}")
 NOT_STARTED = Message("why.not-started", "nothing has started the program")
 HELD = {
@@ -59,7 +57,6 @@ class ProgramCauses:
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world
-        self._interrupts: dict[tuple[str, str], Sequence[range]] = {}
         self._uses: dict[tuple[str, StatementLocation], StatementUse] = {}
 
     def use(self, controller: str, index: int) -> StatementUse:
@@ -127,7 +124,7 @@ class ProgramCauses:
         following = [one for one in programs.after(location.text).get(location.number, ()) if one in numbers]
         if location.number not in programs.reached(location.text, following):
             numbers.discard(location.number)  # it is executed, and does not come again
-        others = [one for one in self._handlers(controller, location.text) if location.number not in one]
+        others = [one for one in self._all.interrupts.handlers(controller, location.text) if location.number not in one]
         return any(
             wanted in programs.use(StatementLocation(location.text, number)).writes
             for number in numbers
@@ -149,8 +146,8 @@ class ProgramCauses:
         """The last statement by a moment that would have changed something until what it waited for was there, which it was."""
         if controller not in self._world.programs:
             return None
-        writing = self._writing(controller, wanted)
-        index = self._last_of(controller, writing, self._log.last_executed(controller, at) + 1)
+        writing = self.writing(controller, wanted)
+        index = self.last_of(controller, writing, self._log.last_executed(controller, at) + 1)
         if index is None:
             return None
         is_over = self.use(controller, index).waits and index < self._log.last_executed(controller, at)
@@ -173,72 +170,7 @@ class ProgramCauses:
         against = self.decided_against(controller, wanted, at)
         return held if against is None else against._replace(along=() if held is None else (held,))
 
-    def is_of_interrupt(self, controller: str, index: int) -> bool:
-        """Whether an executed statement stands in an interrupt."""
-        executed = self._log.executed[controller][index]
-        if not self._log.is_of_present_text(executed):
-            return False
-        return any(executed.location.number in one for one in self._handlers(controller, executed.location.text))
-
-    def interrupts(
-        self, controller: str, wanted: Resource
-    ) -> Iterator[tuple[StatementUse, StatementLocation, StatementLocation]]:
-        """The interrupts in which a statement changes something, each with its label and the first such statement."""
-        programs = self._world.programs[controller]
-        for text in programs.texts:
-            for handler in self._handlers(controller, text):
-                places = [StatementLocation(text, number) for number in handler]
-                writing = next((one for one in places[1:] if wanted in programs.use(one).writes), None)
-                if writing is not None:
-                    yield programs.use(places[0]), places[0], writing
-
-    def has_come(self, controller: str, label: StatementLocation, at: Nanos) -> bool:
-        """Whether an interrupt has come by a moment."""
-        executed, labels = self._log.last_executed(controller, at) + 1, (label,)
-        is_noted = self._log.last_of(controller, labels, executed) is not None
-        return is_noted or self._log.executed_before(controller, labels) is not None
-
-    def switched(self, controller: str, wanted: Resource, at: Nanos) -> Iterator[tuple[str, Cause]]:
-        """The switches, written since, of the interrupt that changed something last and would have changed it again by a moment;
-        each with the statement that is not executed while it is off, which leads to who wrote it."""
-        writing = self._writing(controller, wanted)
-        handlers = [(text, one) for text in self._world.programs[controller].texts for one in self._handlers(controller, text)]
-        is_changed = any(where.text == text and where.number in one for where in writing for text, one in handlers)
-        if not is_changed or self.stands(controller, at) is not None:
-            return
-        last = self._last_of(controller, writing, self._log.last_executed(controller, at) + 1)
-        if last is None or not self._log.is_of_present_text(self._log.executed[controller][last]):
-            return
-        text, number = self._log.executed[controller].locations[last]
-        handler = next((one for where, one in handlers if where == text and number in one), range(0))
-        uses = [self._world.programs[controller].use(StatementLocation(text, one)) for one in handler]
-        changing, made = [one for one in uses if wanted in one.writes], {one for use in uses for one in use.writes}
-        if not handler or (len(changing) < 2 and made.isdisjoint(changing[0].reads)):
-            return  # it would change nothing
-        label, since = StatementLocation(text, handler.start), self._log.executed[controller].times[last]
-        words = OF_INTERRUPT(statement=statement_at(self._world.programs[controller], StatementLocation(text, number)))
-        for switch in uses[0].acts_by:
-            written = self.resource(controller, switch, self._log.last_executed(controller, at) + 1, at)
-            moment = -1 if written is None else written.place.time
-            if written is not None and moment > since and self._comes_again(controller, label, last, moment, at):
-                place = written.place._replace(number=written.place.number + 1)
-                by = partial(given, covered(written, Cover.LEVEL))
-                yield switch.name, Cause(ChainLink(moment, controller, words), place, by, Cover.LEVEL)
-
-    def _comes_again(self, controller: str, label: StatementLocation, index: int, since: Nanos, until: Nanos) -> bool:
-        """Whether the event of an interrupt that had come before a statement comes again between two moments."""
-        times, reads = self._log.executed[controller].times, self._world.programs[controller].use(label).reads
-        came = self._last_of(controller, (label,), index)
-        if came is None:
-            return False
-        if not reads:  # it comes with the time
-            before = self._last_of(controller, (label,), came)
-            return before is not None and until - times[came] > times[came] - times[before]
-        pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN]
-        changes = ((self._log.level(pin, times[came]), one) for pin in pins for one in self._log.changes_before(pin, until))
-        return any(one.time > since and one.value == level for level, one in changes)
-
-    def _last_of(self, controller: str, locations: Collection[StatementLocation], before: int) -> int | None:
+    def last_of(self, controller: str, locations: Collection[StatementLocation], before: int) -> int | None:
         """As that of the log, which is to have it."""
         found = self._log.last_of(controller, locations, before)
         if found is None and self._log.executed_before(controller, locations) is not None:
@@ -312,7 +244,7 @@ class ProgramCauses:
         """The numbers of the conditions that were evaluated since a statement was executed before; none without a loop, or with a
         wait for more than a time in it, unless ``has_waits``."""
         here = (self._log.executed[controller].locations[index],)
-        before = self._last_of(controller, here, index)
+        before = self.last_of(controller, here, index)
         loop = [] if before is None else list(range(before, index))
         if not has_waits and any((use := self.use(controller, one)).waits and use.reads for one in loop):
             return []
@@ -334,15 +266,6 @@ class ProgramCauses:
             point = None if name is None else kind.point(self._world.controller(controller), name)
             if point is not None and point.point.path.lower() == path.lower():
                 yield one
-
-    def _handlers(self, controller: str, text: str) -> Sequence[range]:
-        """The statements of each interrupt of a text, with the one that it begins with."""
-        key = controller, text
-        if key not in self._interrupts:
-            programs = self._world.programs[controller]
-            found = [programs.use(StatementLocation(text, number)) for number in programs.labels(text).values()]
-            self._interrupts[key] = [range(use.governs.start - 1, use.governs.stop) for use in found if use.waits and use.governs]
-        return self._interrupts[key]
 
     def _of_statement(self, controller: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed; of a command that came over the line by itself that, or the
@@ -375,7 +298,7 @@ class ProgramCauses:
         number = executed[index].location.number
         at_once, after = self._world.programs[controller].statement_time, index
         is_present = self._log.is_of_present_text(executed[index])
-        handlers = self._handlers(controller, executed[index].location.text) if is_present else ()
+        handlers = self._all.interrupts.handlers(controller, executed[index].location.text) if is_present else ()
         begun = self._log.last_begin(controller, executed[index].time, executed[index].order)
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
             if begun is not None and executed[earlier].order < begun.order:
@@ -430,7 +353,7 @@ class ProgramCauses:
         locations = self._log.executed[controller].locations
         first, earlier = index, index - 1
         here = self._log.executed[controller][index]
-        handlers = self._handlers(controller, here.location.text) if self._log.is_of_present_text(here) else ()
+        handlers = self._all.interrupts.handlers(controller, here.location.text) if self._log.is_of_present_text(here) else ()
         begun = self._log.last_begin(controller, here.time, here.order)
         orders = self._log.executed[controller].orders
         while (earlier >= 0 and (begun is None or orders[earlier] > begun.order)) and (
@@ -447,8 +370,8 @@ class ProgramCauses:
         executed, use, words = self._log.executed[controller], self.use(controller, index), self.written_at(controller, index)
         if use.waits and use.governs:
             return CAME(statement=statement(self._log, words))
-        is_inside = self.is_of_interrupt(controller, index)
-        later = (one for one in range(index + 1, len(executed)) if is_inside or not self.is_of_interrupt(controller, one))
+        is_inside = self._all.interrupts.has(controller, index)
+        later = (one for one in range(index + 1, len(executed)) if is_inside or not self._all.interrupts.has(controller, one))
         after = next(later, None)
         if after is None:
             return WAS_EXECUTED(statement=statement(self._log, words))
@@ -461,23 +384,16 @@ class ProgramCauses:
         if has_ended:
             return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
         if use.waits and use.governs and not use.reads:  # an interrupt that comes with the time
-            return Cause(link, place, nothing, Cover.PROGRAM, partial(self._enabled, controller, index, place))
+            return Cause(link, place, nothing, Cover.PROGRAM, partial(self._all.interrupts.enabled, controller, index, place))
         led = cache(partial(self._of_decision, controller, index, place))
 
         def besides() -> Iterator[Cause]:
             yield from (one for one in led()[1:] if one is not None)
             yield from self._unchanged(controller, index, place)
             if use.waits and use.governs:
-                yield from self._enabled(controller, index, place)
+                yield from self._all.interrupts.enabled(controller, index, place)
 
         return Cause(link, place, lambda: led()[0], Cover.PROGRAM, besides)
-
-    def _enabled(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
-        """Causes for which an interrupt was enabled."""
-        for one in self.use(controller, index).acts_by:
-            found = self.resource(controller, one, index, place.time, place.order)
-            if found is not None:
-                yield found
 
     def _unchanged(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """Causes for all that a condition reads and that has had its value from the beginning."""
@@ -607,7 +523,7 @@ class ProgramCauses:
 
     def written(self, controller: str, resource: Resource, index: int) -> FoundCause:
         """The last statement before one that changed something."""
-        writing = self._writing(controller, resource)
+        writing = self.writing(controller, resource)
         earlier = self._log.last_of(controller, writing, index)
         if earlier is not None:
             return covered(self.statement(controller, earlier), Cover.LEVEL)
@@ -683,7 +599,7 @@ class ProgramCauses:
         """How long a level must last at an input before a program sees it."""
         return self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
 
-    def _writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
+    def writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
         """The statements that change something."""
         programs = self._world.programs[controller]
         every = (StatementLocation(text, one) for text in programs.texts for one in range(len(programs.statements(text))))

@@ -180,7 +180,7 @@ class Why:
 
     def _switched_off(self, changeable: Iterable[tuple[str, Resource]], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
         """The switches that are off of the interrupts that would have changed something again."""
-        every = [(owner, *found) for owner, one in changeable for found in self.causes.programs.switched(owner, one, at)]
+        every = [(owner, *found) for owner, one in changeable for found in self.causes.interrupts.switched(owner, one, at)]
         if not every:
             return ()
         other = yield from self.past.world_at(at)
@@ -316,7 +316,7 @@ class Why:
         state = IS_NUMBER(name=text, value=other.programs[controller].variables(at).get(name, 0.0))
         present, wanted = (yield from self._present(at)), Resource(ResourceKind.VALUE, name)
         there = None if written is None else self.causes.of(written.place.time)  # it may be numbered in the log of another moment
-        came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
+        came = there is not None and written is not None and there.interrupts.has(controller, written.place.number // 3)
         states = [] if came else list(present.interrupted(controller, wanted))
         since, off = None if last is None else last.place.time, (yield from self._switched_off([(controller, wanted)], at))
         events = self._awaited_events(controller, wanted, other)
@@ -325,11 +325,11 @@ class Why:
     def _awaited_events(self, controller: str, wanted: Resource, other: Simulation) -> Iterator[Cause]:
         """The last changes of what the interrupts wait for that would change something, are on and have not come. ``other``: a
         world in the state of the moment."""
-        programs, at = self.causes.programs, other.now
+        programs, interrupts, at = self.causes.programs, self.causes.interrupts, other.now
         index = self.log.last_executed(controller, at) + 1
-        for use, label, _ in programs.interrupts(controller, wanted):
+        for use, label, _ in interrupts.changing(controller, wanted):
             is_on = all(other.programs[controller].read(switch.name, at) for switch in use.acts_by)
-            if not is_on or programs.has_come(controller, label, at):
+            if not is_on or interrupts.has_come(controller, label, at):
                 continue
             switched = [programs.resource(controller, switch, index, at) for switch in use.acts_by]
             since = max((one.place for one in switched if one is not None), default=Place(-1))

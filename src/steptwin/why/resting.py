@@ -106,7 +106,7 @@ class RestingCauses:
                 yield from ((owner, one) for one in use.reads if use.waits)
                 loop = () if use.waits and use.reads else programs.conditions_of_loop(owner, index)
                 counted = (one for number in loop for one in programs.use(owner, number).reads)
-                yield from ((owner, one) for one in counted if any(programs.interrupts(owner, one)))
+                yield from ((owner, one) for one in counted if any(self._past.causes.interrupts.changing(owner, one)))
 
     def awaited_pins(self, signals: Iterable[str], at: Nanos) -> Iterator[str]:
         """The pins among `awaited`."""

@@ -1,0 +1,106 @@
+"""The causes for which interrupts of programs came, or did not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from steptwin.controller import Nanos
+from steptwin.messages import Message
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, Place, covered, given
+from steptwin.why.sentences import statement_at
+
+OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
+OF_AWAITED_INTERRUPT = Message("why.of-awaited-interrupt", "{statement} is executed by {label}, which has not come")
+
+
+class InterruptCauses:
+    """Finds them. ``causes`` has the causes of everything else."""
+
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+        self._handlers: dict[tuple[str, str], Sequence[range]] = {}
+
+    def has(self, controller: str, index: int) -> bool:
+        """Whether an executed statement stands in an interrupt."""
+        executed = self._log.executed[controller][index]
+        if not self._log.is_of_present_text(executed):
+            return False
+        return any(executed.location.number in one for one in self.handlers(controller, executed.location.text))
+
+    def changing(self, controller: str, wanted: Resource) -> Iterator[tuple[StatementUse, StatementLocation, StatementLocation]]:
+        """The interrupts in which a statement changes something, each with its label and the first such statement."""
+        programs = self._world.programs[controller]
+        for text in programs.texts:
+            for handler in self.handlers(controller, text):
+                places = [StatementLocation(text, number) for number in handler]
+                writing = next((one for one in places[1:] if wanted in programs.use(one).writes), None)
+                if writing is not None:
+                    yield programs.use(places[0]), places[0], writing
+
+    def has_come(self, controller: str, label: StatementLocation, at: Nanos) -> bool:
+        """Whether an interrupt has come by a moment."""
+        executed, labels = self._log.last_executed(controller, at) + 1, (label,)
+        is_noted = self._log.last_of(controller, labels, executed) is not None
+        return is_noted or self._log.executed_before(controller, labels) is not None
+
+    def switched(self, controller: str, wanted: Resource, at: Nanos) -> Iterator[tuple[str, Cause]]:
+        """The switches, written since, of the interrupt that changed something last and would have changed it again by a moment;
+        each with the statement that is not executed while it is off, which leads to who wrote it."""
+        writing = self._all.programs.writing(controller, wanted)
+        handlers = [(text, one) for text in self._world.programs[controller].texts for one in self.handlers(controller, text)]
+        is_changed = any(where.text == text and where.number in one for where in writing for text, one in handlers)
+        if not is_changed or self._all.programs.stands(controller, at) is not None:
+            return
+        last = self._all.programs.last_of(controller, writing, self._log.last_executed(controller, at) + 1)
+        if last is None or not self._log.is_of_present_text(self._log.executed[controller][last]):
+            return
+        text, number = self._log.executed[controller].locations[last]
+        handler = next((one for where, one in handlers if where == text and number in one), range(0))
+        uses = [self._world.programs[controller].use(StatementLocation(text, one)) for one in handler]
+        changing, made = [one for one in uses if wanted in one.writes], {one for use in uses for one in use.writes}
+        if not handler or (len(changing) < 2 and made.isdisjoint(changing[0].reads)):
+            return  # it would change nothing
+        label, since = StatementLocation(text, handler.start), self._log.executed[controller].times[last]
+        words = OF_INTERRUPT(statement=statement_at(self._world.programs[controller], StatementLocation(text, number)))
+        for switch in uses[0].acts_by:
+            written = self._all.programs.resource(controller, switch, self._log.last_executed(controller, at) + 1, at)
+            moment = -1 if written is None else written.place.time
+            if written is not None and moment > since and self._comes_again(controller, label, last, moment, at):
+                place = written.place._replace(number=written.place.number + 1)
+                by = partial(given, covered(written, Cover.LEVEL))
+                yield switch.name, Cause(ChainLink(moment, controller, words), place, by, Cover.LEVEL)
+
+    def _comes_again(self, controller: str, label: StatementLocation, index: int, since: Nanos, until: Nanos) -> bool:
+        """Whether the event of an interrupt that had come before a statement comes again between two moments."""
+        times, reads = self._log.executed[controller].times, self._world.programs[controller].use(label).reads
+        came = self._all.programs.last_of(controller, (label,), index)
+        if came is None:
+            return False
+        if not reads:  # it comes with the time
+            before = self._all.programs.last_of(controller, (label,), came)
+            return before is not None and until - times[came] > times[came] - times[before]
+        pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN]
+        changes = ((self._log.level(pin, times[came]), one) for pin in pins for one in self._log.changes_before(pin, until))
+        return any(one.time > since and one.value == level for level, one in changes)
+
+    def enabled(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """Causes for which an interrupt was enabled."""
+        for one in self._all.programs.use(controller, index).acts_by:
+            found = self._all.programs.resource(controller, one, index, place.time, place.order)
+            if found is not None:
+                yield found
+
+    def handlers(self, controller: str, text: str) -> Sequence[range]:
+        """The statements of each interrupt of a text, with the one that it begins with."""
+        key = controller, text
+        if key not in self._handlers:
+            programs = self._world.programs[controller]
+            found = [programs.use(StatementLocation(text, number)) for number in programs.labels(text).values()]
+            self._handlers[key] = [range(use.governs.start - 1, use.governs.stop) for use in found if use.waits and use.governs]
+        return self._handlers[key]
