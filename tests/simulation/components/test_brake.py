@@ -125,6 +125,7 @@ def test_a_brake_holds_it() -> None:
     world = World.from_toml(TEXT + BRAKE)
     world.run(until=1.0)
     assert (world.axis["z"].position, world.read("hold.released")) == (200.0, 0)
+    assert events(world, "fall") == []  # it does not move for no time at the beginning either
     device = world.mic488["a"]
     device.write("M1_EN", 1)
     device.write("OUT1", 1)

@@ -276,6 +276,8 @@ class Mechanism(Stateful):
         trajectory = self._trajectory
         if trajectory is self._reported_trajectory:
             return
+        if self._reported_trajectory is None and self._hold is not None:
+            self._watch_fall(now, trajectory.coasting)
         self._reported_trajectory = trajectory
         coasting = trajectory.coasting
         if coasting is not None and coasting.segments:
@@ -387,7 +389,7 @@ class Mechanism(Stateful):
             self._watch_motor(now)
         if self.build.low is not None or self.build.high is not None:
             self._watch_stops(now)
-        if self._hold is not None:
+        if self._hold is not None and self._reported_trajectory is not None:  # while it is built, a brake may be still to come
             self._watch_fall(now, coasting)
 
     # ------------------------------------------------------------------ load
