@@ -16,12 +16,13 @@ from steptwin.simulation.components.load import ACTS, LoadSpec
 from steptwin.simulation.components.touch import JAM
 from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.mechanics.rotorhold import MOVES_WITH_LITTLE_CURRENT
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing, unknown
 from steptwin.why.controllers import HOMED, acted
 from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 
@@ -35,6 +36,8 @@ AS = Message("why.as", "{what}, as {condition}")
 BEGAN_TO_BRAKE = Message("why.began-to-brake", "{axis} began to brake")
 MOTION_CHANGED = Message("why.motion-changed", "the motion of {axis} changed, which began at {time:.6f} s")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
+HAD_NO_POWER = Message("why.had-no-power", "{axis} had no power from {begin:.6f} s on: the pulses since then moved nothing")
+HOLDS = Message("why.holds", "the motor of {axis} holds {torque:g} N·m at rest, as {key} in {where} has it")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 BRAKES_NS: Nanos = SECOND // 10
 """How much later than a load stands its brake may have closed (`steptwin.simulation.components.brake`)."""
@@ -263,6 +266,9 @@ class AxisCauses:
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
         if event is None:
             self._log.never_happened(*EVENTS_OF_ROTORS)
+        last = max((one.time for one in led), default=0)
+        if event is not None and self._log.record(event).subject == FALL and not self.holds_rotor(event, events):
+            event = None if motion is not None and motion.link.time > last else event  # its motion has gone on since
         rests = until if since is None else min(until, since + BRAKES_NS)
         is_off = power is not None and not self._log.level(self.power_of(axis), until)
         is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
@@ -275,7 +281,7 @@ class AxisCauses:
             found = self.rotor_event(axis, event)
             return self._caught_by(axis, found, rests) if self._log.record(event).subject == FALL else found
         if event is not None and power is not None and not is_off and self._log.record(event).subject == FALL:
-            others = (power, covered(motion, Cover.LEVEL))  # it fell on until it was caught
+            others = (self._missed(axis, until) or power, covered(motion, Cover.LEVEL))  # it fell on until it was caught
             return self.rotor_event(axis, event)._replace(along=tuple(one for one in others if one is not None))
         if is_unpowered and power is not None:
             let_go = self._let_go(axis, power, rests)
@@ -299,8 +305,7 @@ class AxisCauses:
         homed = [one for one in self._log.axis_events.get(key, ()) if self._log.record(one).subject == HOMED]
         zeroed = max((one.time for one in (*homed, *self._log.origins.get(key, ())) if one.time <= until), default=0)
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES, since=zeroed)
-        if lost is not None:
-            yield lost
+        yield from (one for one in (lost, self._missed(axis, until, zeroed)) if one is not None)
         if end is None:
             return
         began = next((one for one in reversed(events) if one.time <= end.time and _begins(self._log.record(one))), None)
@@ -320,9 +325,30 @@ class AxisCauses:
 
     def _regained(self, axis: str, found: Cause, power: Cause, motion: FoundCause) -> Cause:
         """That a motor has power again, along with the loss of it, during which its motion went on, and with that motion."""
-        lost = self.power(axis, power.place.time, power.place.order)
+        lost = self._missed(axis, power.place.time) or self.power(axis, power.place.time, power.place.order)
         others = (lost, covered(motion, Cover.LEVEL))
         return found._replace(along=(*found.along, *(one for one in others if one is not None)))
+
+    def _missed(self, axis: str, until: Nanos, since: Nanos = -1) -> FoundCause:
+        """The last time without power between two moments, over by then, in which the pulses of an axis went on."""
+        signal, (controller, name) = self.power_of(axis), self._world.axes[axis].spec.drive
+        back = self.power(axis, until) if signal else None
+        for _ in range(MOST_SUMMED):
+            lost = None if back is None else self.power(axis, back.place.time, back.place.order)
+            there = None if back is None else self._all.of(back.place.time)
+            if back is None or lost is None or there is None or not since < back.place.time or lost.place >= back.place:
+                return None
+            time, begin = back.place.time, lost.place.time
+            plans = there.log.plans_in_force(controller, name.removeprefix("M"), time) if there.log.level(signal, time) else ()
+            if any(there.axes._end(one)[0] > begin and there.axes.moves(one) for one in plans):
+                text, place = HAD_NO_POWER(axis=axis, begin=begin / SECOND), back.place._replace(number=back.place.number + 1)
+                return Cause(ChainLink(time, axis, text), place, partial(along, back, [lost]), Cover.LEVEL)
+            back = lost
+        return None
+
+    def moves(self, plan: Change) -> bool:
+        """Whether a plan is one of a motion."""
+        return bool(profile_of(self._log.record(plan).plan()).segments)
 
     def _is_after(self, power: Cause, event: Change) -> bool:
         """Whether a change of power comes after an event of a rotor: what falls by it is recorded before it."""
@@ -377,7 +403,12 @@ class AxisCauses:
             self._log.never_happened(*EVENTS_OF_ROTORS)
         found = None if event is None else self.rotor_event(axis, event)
         lost = self._lost_by_fault(axis, until, LAST, LOSES_PULSES, IS_BLOCKED)
-        last = max((one for one in (found, lost) if one is not None), key=lambda one: one.place, default=None)
+        missed = self._missed(axis, until) if subjects is OF_MECHANICS else None
+        if missed is not None:
+            controller, name = self._world.axes[axis].spec.drive
+            motion = covered(self.motion(controller, name.removeprefix("M"), missed.place.time, axis), Cover.MOTION)
+            missed = along(missed, [motion])
+        last = max((one for one in (found, lost, missed) if one is not None), key=lambda one: one.place, default=None)
         return self.moved(axis, until) if last is None else last
 
     def is_moving(self, controller: str, axis: str, time: Nanos) -> bool:
@@ -444,7 +475,9 @@ class AxisCauses:
             found.append(motion._replace(place=min(motion.place, Place(event.time, event.order, -1))))
         else:
             current = self._without_current(axis, event) if falls else None
-            found.append(current or self.moved(axis, event.time, event.order, is_held=begins))
+            led = current or self.moved(axis, event.time, event.order, is_held=begins)
+            is_weak = words_of(self._log.record(event)).id == MOVES_WITH_LITTLE_CURRENT.id
+            found += [covered(led, Cover.LEVEL), self._holding(axis, event)] if is_weak else [led]
         first, *others = sorted((one for one in found if one is not None), key=lambda one: one.place, reverse=True) or (None,)
         return None if first is None else first._replace(along=(*first.along, *others))
 
@@ -467,6 +500,18 @@ class AxisCauses:
                 yield self._all.first(signal)._replace(cover=Cover.LEVEL)
                 keeping = self._all.holding.of([signal], event.time - 1, None) if event.time else ()
                 yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in keeping)
+
+    def _holding(self, axis: str, event: Change) -> Cause:
+        """The torque of a motor that has current when its load turns it at rest, and where the description has that."""
+        built, (controller, name) = self._world.axes[axis], self._world.axes[axis].spec.drive
+        motor, spec = built.mechanism.build.motor, built.spec.motor
+        plans = self._log.plans_in_force(controller, name.removeprefix("M"), event.time, event.order)
+        on = self._all.last([one for one in (self.power_of(axis), f"{controller}.{name}_EN") if one], event.time)
+        rests = max(max((self._end(one)[0] for one in plans), default=0), 0 if on is None else on.place.time)
+        is_reduced = motor.hold < 1.0 and event.time >= rests + motor.hold_ns
+        key, torque = ("hold_current", motor.hold * motor.holding) if is_reduced else ("torque", motor.holding)
+        text = HOLDS(axis=axis, torque=torque, key=key, where=self._world.spec.text.where((*spec.path, key)))
+        return Cause(ChainLink(event.time, axis, text), Place(event.time, event.order, -1), nothing)
 
     def _without_current(self, axis: str, event: Change) -> FoundCause:
         """The last that took the current of a motor by an event: its power, or its controller."""
