@@ -41,7 +41,7 @@ export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 
-PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config make mosquitto mosquitto-clients openssl postgresql \
+PEER_PACKAGES := chromium-headless-shell curl mbpoll libmodbus-dev gcc libc6-dev pkg-config make mosquitto mosquitto-clients openssl postgresql \
   prometheus ser2net tshark
 
 .DEFAULT_GOAL := help

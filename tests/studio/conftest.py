@@ -202,11 +202,10 @@ def newer_source(page: Path, web: Path = ROOT / "studio-web") -> Path | None:
 
 
 @pytest.fixture(scope="module")
-def browser(require_peer: Callable[[str], str]) -> Iterator[Browser]:
+def browser(chromium: str) -> Iterator[Browser]:
     """Skipped without a browser or a page; a page that is older than its sources fails."""
     from playwright.sync_api import sync_playwright
 
-    chromium = require_peer("chromium")
     try:
         changed = newer_source(find_page())
     except Refusal as error:

@@ -137,7 +137,7 @@ def keep(png: bytes, name: str) -> None:
 
 
 def main() -> None:
-    chromium = shutil.which("chromium")
+    chromium = shutil.which("chromium-headless-shell")
     with studio(describe_demo(free_ports=True)) as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", *GRAPHICS])
         page = browser.new_page(viewport={"width": 1600, "height": 900})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -243,10 +242,10 @@ def test_a_device_moves_the_machine_and_what_is_not_known_is_grey(
 
 
 @pytest.fixture
-def graphics(browser: Browser) -> Iterator[Browser]:
+def graphics(browser: Browser, chromium: str) -> Iterator[Browser]:
     """A browser that draws WebGL without a graphics processor."""
     arguments = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    started = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=arguments)
+    started = browser.browser_type.launch(executable_path=chromium, args=arguments)
     yield started
     started.close()
 

@@ -5,7 +5,6 @@ import json
 import random
 import re
 import subprocess
-from collections.abc import Callable
 from itertools import pairwise
 from math import cos, pi
 from pathlib import Path
@@ -183,20 +182,20 @@ def shown(browser: str, page: Path) -> str:
     return ran.stdout
 
 
-def test_channels_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
+def test_channels_in_a_browser(chromium: str, tmp_path: Path) -> None:
     """Axes that never move share a row; commanded and true position share a channel; an axis that has homed shows its count
     too."""
     world = World.load(WORLDS / "feeder.toml")
     world.run(for_=8)
     page = tmp_path / "t.html"
     write_trace(world.trace, page, views=axis_views(world))
-    channels = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium"), page))
+    channels = re.findall(r'class="name"[^>]*>([^<]*)<', shown(chromium, page))
     assert channels[:3] == ["table", "M1 position, x true", "M1 since power-on"]
     assert channels[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
     assert not [name for name in channels if name.startswith("M2 ")]
 
 
-def test_the_page_computes_the_motion_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
+def test_the_page_computes_the_motion_in_a_browser(chromium: str, tmp_path: Path) -> None:
     """Position, velocity and count of a move along an arc, and the range of its channel, as the scripts of the page have them."""
     arc = circle(5000.0, 0.0, 5000.0, 4.0)
     curve = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
@@ -214,7 +213,7 @@ def test_the_page_computes_the_motion_in_a_browser(require_peer: Callable[[str],
     """
     page = tmp_path / "t.html"
     page.write_text(page_of(trace).replace("</script>\n</body>", script % moments + "</script></body>"), "utf-8")
-    (shown_output,) = re.findall(r"<output>(.*?)</output>", shown(require_peer("chromium"), page))
+    (shown_output,) = re.findall(r"<output>(.*?)</output>", shown(chromium, page))
     found = json.loads(shown_output)
     for now, (position, velocity, count) in zip(moments, found["looks"], strict=True):
         assert position == pytest.approx(profile.position(now), abs=1e-6)

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,7 +26,7 @@ def solids(svg: str) -> list[Solid]:
     return [(name, float(x), float(y), tuple(re.findall(r' (?:d|fill)="([^"]*)"', paths))) for x, y, name, paths in groups]
 
 
-def test_the_timeline_draws_what_a_picture_of_its_moment_does(require_peer: Callable[[str], str], tmp_path: Path) -> None:
+def test_the_timeline_draws_what_a_picture_of_its_moment_does(chromium: str, tmp_path: Path) -> None:
     """In a browser, from a file, with all that the page needs in it; and the same after the trace was read again."""
     recorder, world = SceneRecorder(), World.load(WORLDS / "palletizer/palletizer.toml")
     recorder.follow(world)
@@ -40,7 +39,7 @@ def test_the_timeline_draws_what_a_picture_of_its_moment_does(require_peer: Call
     page.write_text(text.replace("readAddress();\n", 'location.hash = "#at=7.25";\nreadAddress();\n', 1), "utf-8")
     there = World.load(WORLDS / "palletizer/palletizer.toml")
     there.run(for_=7.25)
-    found, expected = solids(shown(require_peer("chromium"), page)), solids(picture(there, View.ISO))
+    found, expected = solids(shown(chromium, page)), solids(picture(there, View.ISO))
     assert [(name, shapes) for name, *_, shapes in found] == [(name, shapes) for name, *_, shapes in expected]
     places = [[one for _, x, y, _ in drawn for one in (x, y)] for drawn in (found, expected)]
     assert places[0] == pytest.approx(places[1], abs=0.011)  # rounded to two digits, and differently
