@@ -72,7 +72,7 @@ ASKED: list[Asked] = [(machine.name, question, at) for machine in MACHINES.value
 
 def act(text: str) -> ExternalInput:
     """What comes from outside: ``press go``, ``release go``, ``set c.IN1 1``, ``write c.M1_POS_ABS 10``, ``fault ...``,
-    ``clear NAME``, ``request 01 05 17 71 ff 00`` of the client hmi."""
+    ``clear NAME``, ``request 01 05 17 71 ff 00`` of the client hmi, ``spoilt`` with another check sum."""
     word, _, rest = text.partition(" ")
     match word:
         case "press":
@@ -91,6 +91,8 @@ def act(text: str) -> ExternalInput:
             return do.SetFault(read_fault(rest))
         case "clear":
             return do.ClearFault(rest)
+        case "spoilt":
+            return Bytes("bus", "hmi", "rtu", bytes.fromhex(rest))
         case "request":
             return Bytes("bus", "hmi", "rtu", with_crc(bytes.fromhex(rest)))
     raise AssertionError(text)

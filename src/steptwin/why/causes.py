@@ -39,6 +39,7 @@ SINCE = Message("why.since", "since {time:.6f} s")
 DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
 OVER_INVERTED_WIRE = Message("why.over-inverted-wire", "{driven} over an inverted wire")
 IS_WIRED_INVERTED = Message("why.is-wired-inverted", ", which is wired to {pin} and inverted there")
+ALTERED = Message("why.altered", "{fault}, in: {request}")
 AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
 NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired")
@@ -241,8 +242,12 @@ class Causes:
 
     def fault_link(self, record: TraceRecord) -> ChainLink:
         """Link of a record of a fault."""
-        text = FAULT(name=record.subject, what=record.value)
-        return ChainLink(record.time, record.controller, text, self.fault_root(record.subject, record.time))
+        return ChainLink(record.time, record.controller, self.of_record(record), self.fault_root(record.subject, record.time))
+
+    def of_record(self, record: TraceRecord) -> MessageText:
+        """A fault in words; of one that altered what went over a line, with that."""
+        text, altered = FAULT(name=record.subject, what=record.value), self.controllers.altered(record)
+        return text if altered is None else ALTERED(fault=text, request=altered)
 
     def fault_root(self, name: str, until: Nanos) -> SetFault:
         """A fault that acts at a moment, with the act that set it."""

@@ -11,19 +11,21 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.faults.kinds_physics import NO_SUPPLY
+from steptwin.simulation.faults.port import TOWARDS_THE_TWIN
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
-from steptwin.simulation.world.inputs import Download, See, SetVariable
+from steptwin.simulation.world.inputs import Bytes, Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.log import BEGINS, LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import SETS_A_FAULT, describe_input
+from steptwin.wire.crc import with_crc
 
 CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
@@ -37,12 +39,16 @@ POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
 NOT_HEARD = Message("why.not-heard", "`{command}` was sent while {controller} was not selected")
 REFUSED = Message("why.refused", "{request}: refused, {reason}")
+WRONG_CHECKSUM = Message("why.wrong-checksum", "{request}: not heard, its check sum is wrong")
 NOT_STARTED_SINCE = Message("why.not-started-since", "{event}, and nothing has started the program since")
+BEGAN_ANEW = Message("why.began-anew", "{event}, and the program began anew")
 NOT_SWITCHED_ON_SINCE = Message("why.not-switched-on-since", "{event}, and nothing has switched {name} on since")
 NOT_COMMANDED_SINCE = Message("why.not-commanded-since", "{event}, and nothing has commanded {axis} to move since")
 REQUEST = Message("why.request", "request: {meaning}")
 
 
+LEAST_FRAME = 4
+"""Bytes of the shortest frame: unit, function, check sum."""
 _AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
 """A point that a motion changes; the group is the number of its axis, none where the controller has one only."""
 
@@ -213,17 +219,45 @@ class ControllerCauses:
         """The last refused request by a moment, before an order and after another moment, that would have written one of these
         registers of a controller."""
         patterns = [_name_of(name) for name in names]
-        for order, (request, reason) in reversed(self._log.frames.refused.items()):
-            if request.time > until or order >= before or not self._is_to(controller, request, order):
-                continue
-            if request.time <= after:
-                return None
-            found = self._frame(request, order)
+        for found in self._not_taken(controller, until, before, after):
             if any(pattern.search(found.link.text) for pattern in patterns):
-                text = REFUSED(request=found.link.text, reason=reason)
-                return covered(found._replace(link=replace(found.link, text=text)), Cover.LEVEL)
+                return covered(found, Cover.LEVEL)
         if after < self._log.begin and controller in self._world.objects.line_of:
             self._log.lack()  # a request may have been refused before
+        return None
+
+    def _not_taken(self, controller: str, until: Nanos, before: int, after: Nanos) -> Iterator[Cause]:
+        """Requests to a controller between two moments, before an order, that it refused or that came with a wrong check sum, the
+        last one first."""
+        on, found = self._world.objects.line_of.get(controller), list[Cause]()
+        for order, (request, reason) in self._log.frames.refused.items():
+            if self._is_to(controller, request, order):
+                one = self._frame(request, order)
+                found.append(one._replace(link=replace(one.link, text=REFUSED(request=one.link.text, reason=reason))))
+        for act in self._log.acts_before(until, before) if on is not None else ():
+            what = act.what
+            if on is not None and isinstance(what, Bytes) and what.line == on[0].name and _is_spoilt(what, on[1]):
+                text = WRONG_CHECKSUM(request=CLIENT(client=what.place, meaning=self.sends(what, act.time)))
+                link = ChainLink(act.time, what.line, text)
+                found.append(Cause(link, Place(act.time, act.order, 1), partial(acted, act)))
+        found.sort(key=lambda one: one.place, reverse=True)
+        return (one for one in found if after < one.place.time <= until and one.place.order < before)
+
+    def sends(self, what: Bytes, time: Nanos) -> str:
+        """What a client sends in words, whether or not it comes so."""
+        return self._log.frames.words(what.line, f"{what.place}/sent", what.data, time)
+
+    def altered(self, record: TraceRecord) -> MessageText | str | None:
+        """What went to the controllers of a line as a fault altered it, in words; None for another fault."""
+        line, places = record.controller, getattr(record.value, "values", {}).get("place", ())
+        if line not in self._world.lines or TOWARDS_THE_TWIN.id not in [one["id"] for one in places if isinstance(one, dict)]:
+            return None
+        members = {name for name, (on, _) in self._world.objects.line_of.items() if on.name == line}
+        for act in self._log.acts_before(record.time, LAST):
+            if isinstance(act.what, Bytes) and act.what.line == line and act.what.place in places:
+                return self.sends(act.what, act.time)
+            if SCRIPTS in places and _requests(act, line, members):
+                return describe_input(act.what)
         return None
 
     def unheard(self, controller: str, wanted: Resource | None, until: Nanos, after: Nanos = -1) -> FoundCause:
@@ -273,8 +307,9 @@ class ControllerCauses:
         return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM, besides)
 
     def begun_in_vain(self, controller: str, wanted: Resource | None, since: Nanos | None, at: Nanos) -> FoundCause:
-        """Event that began a controller anew between two moments, if nothing has started its program since, by which ``wanted``
-        would change, or has switched that on or moved it. ``since``: by default when the program was stopped."""
+        """Event that began a controller anew between two moments, if its program, by which ``wanted`` would change, has not come
+        to that again, or nothing has started it since, switched that on or moved it. ``since``: by default when the program was
+        stopped."""
         event, held = self._log.last_begin(controller, at, LAST), self._all.programs.held(controller, at)
         since = held.place.time if since is None and held is not None and held.place.order >= 0 else since
         if event is None or event.position < 0 or since is None or event.time <= since:
@@ -291,7 +326,12 @@ class ControllerCauses:
             state, alarm = log.states.last(controller, at, LAST), programs.alarm(controller, at)
             was_tried = alarm is not None and alarm.place.time >= begun.time
             is_over = state is not None and state.state in OVER and state.time <= begun.time
-            return NOT_STARTED_SINCE(event=event) if is_over and not was_tried else None
+            if is_over or wanted is None:
+                return NOT_STARTED_SINCE(event=event) if is_over and not was_tried else None
+            last = log.last_executed(controller, at)
+            written = programs.written(controller, wanted, last + 1)
+            is_anew = last >= 0 and log.executed[controller].times[last] > begun.time
+            return BEGAN_ANEW(event=event) if is_anew and (written is None or written.place.time < begun.time) else None
         pin = f"{controller}.{wanted.name if wanted.kind is ResourceKind.PIN else f'M{wanted.name}_EN'}"
         if log.has(pin) and not log.level(pin, at):
             return NOT_SWITCHED_ON_SINCE(event=event, name=pin) if (log.since(pin, at) or 0) <= begun.time else None
@@ -540,6 +580,12 @@ def axis_of(point: str) -> Resource | None:
     if found is None:
         return None
     return Resource(ResourceKind.ENCODER if "enc" in point.lower() else ResourceKind.AXIS, found[1] or "")
+
+
+def _is_spoilt(what: Bytes, unit: int) -> bool:
+    """Whether it is a request to a unit with a wrong check sum."""
+    whole, is_rtu = len(what.data) >= LEAST_FRAME and what.data[0] == unit, what.kind == "rtu"
+    return is_rtu and whole and with_crc(what.data[:-2]) != what.data
 
 
 def _names(act: Act, meaning: str) -> bool:

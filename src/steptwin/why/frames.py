@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.simulation.kinds.lines import TrafficLog
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -42,12 +43,13 @@ class Frames:
 
     def meaning(self, record: TraceRecord) -> str:
         """A request in words."""
-        client, _, _ = record.subject.rpartition("/")
+        return self.words(record.controller, record.subject.rpartition("/")[0], record.data(), record.time)
+
+    def words(self, line: str, client: str, data: bytes, time: Nanos) -> str:
+        """What a client sends over a line in words, whether or not it comes so."""
         self._read.clear()
-        self.traffic[record.controller].frame(record.time, client, FrameDirection.IN, record.data())
-        if self._read:
-            return "; ".join(one.meaning for one in self._read)
-        return record.data().decode("ascii", "backslashreplace")
+        self.traffic[line].frame(time, client, FrameDirection.IN, data)
+        return "; ".join(one.meaning for one in self._read) if self._read else data.decode("ascii", "backslashreplace")
 
     def take(self, record: TraceRecord, order: int) -> None:
         """Note a frame when it comes: its client may leave."""

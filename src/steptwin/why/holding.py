@@ -63,7 +63,16 @@ class HoldingCauses:
                     yield cause
             if is_leaf:
                 yield from self._all.workpieces.keeping(name, at, floor)
-            yield from self._although(name, at)
+            for one in (name, *(self._inputs(name) if behind is None else ())):
+                yield from self._although(one, at) if one == name or self._log.hold(one, at) is not None else ()
+
+    def _inputs(self, signal: str) -> Iterator[str]:
+        """The sources of the inputs of the element that has a signal."""
+        owner = signal.partition(".")[0]
+        part = self._all.parts.get(owner)
+        for terminal in () if part is None else part.block.levels:
+            if terminal not in part.block.outputs:
+                yield from self._all.sources(PinName(owner, terminal))
 
     def _although(self, signal: str, at: Nanos) -> Iterator[Cause]:
         """The coil of a relay whose contact a fault keeps as it is, what releases a brake, or what drives an input that a fault
@@ -116,7 +125,7 @@ class HoldingCauses:
             record = there.log.fault_record(name, last)
         root = self._all.fault_root(name, until)
         if record is not None:
-            return ChainLink(record.time, record.controller, FAULT(name=name, what=record.value), root)
+            return ChainLink(record.time, record.controller, self._all.of_record(record), root)
         subject = "" if active is None else str(active.fault.get("element") or "")
         text = FAULT if active is None or active.begin else FAULT_ACTS
         return ChainLink(root.time, subject, text(name=name, what="" if active is None else str(active.fault)), root)

@@ -321,7 +321,7 @@ class ProgramCauses:
                 began = Place(executed[first].time, executed[first].order, 3 * first)
                 came = any(cause.place > began for cause in self._read(controller, first, there))
                 return self._decided(controller, first, there, True) if came else self._did_not_wait(controller, earlier)
-            if use.waits and (ignored := self._ignored(controller, earlier)) is not None:
+            if use.waits and not use.governs and (ignored := self._ignored(controller, earlier)) is not None:
                 text = DID_NOT_WAIT(statement=statement(self._log, here), levels=[ignored.link.text])
                 place = Place(here.time, here.order, 3 * earlier + 2)
                 return Cause(ChainLink(here.time, controller, text), place, lambda: ignored, Cover.PROGRAM)

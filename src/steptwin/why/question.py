@@ -140,7 +140,7 @@ class Why:
         behind = self.past.behind(waited, at)
         is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind)
         is_kept = is_kept or any(isinstance(self.causes.contacts.get(name), Sensor) for name in behind)
-        is_kept = is_kept or self.causes.holding.depends(behind)
+        is_kept = is_kept or self.causes.holding.depends(behind) or any(self.log.hold(name, at) for name in behind)
         if is_kept and self.log.reaches_begin():  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self.resting.awaited_pins(decides, at)), at, None)
@@ -361,7 +361,8 @@ class Why:
                 changed = self.resting.ignored((full,), at) if since is None else self.past.changed((full,), since)
                 changed = self.past.unrecorded(full, at) if changed is None and is_turned else changed
             queued = yield from self._queued((full,), at)
-            changed = along(self._commanded(changed, queued), [*queued, *self._again((full,), since, at)])
+            meanwhile = (*self._again((full,), since, at), *self.causes.holding.of((full,), at, since))
+            changed = along(self._commanded(changed, queued), [*queued, *meanwhile])
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
