@@ -148,7 +148,14 @@ def nothing(world: World) -> None:
 
 MOTION = "M1 = ON\nPREL M1 100\nWAITPOS\n"
 STATES: list[tuple[Callable[[], World], Callable[[World], object], list[str], str, int | None]] = [
-    (lambda: wbc("A:\nOUT1 = ON\nOUT1 = OFF\nJUMP A\n"), nothing, [], "running", 0),
+    (lambda: wbc("A:\nOUT1 = ON\nOUT1 = OFF\nJUMP A\n"), nothing, ["a goes on at a.prg:4 JUMP A"], "running", 0),
+    (
+        lambda: wbc("WHILE IN1 = 0\nENDWHILE\n"),
+        nothing,
+        ["a goes on at a.prg:1 WHILE IN1 = 0: a.IN1 is 0, driven by go"],
+        "running",
+        0,
+    ),
     (lambda: wbc("DELAY 9\n"), nothing, [], "running", 1),
     (lambda: wbc("WAIT IN1 = ON\n"), nothing, ["a waits for a.prg:1 WAIT IN1 = ON: a.IN1 is 0, driven by go"], "running", 1),
     (lambda: wbc("n = 3\nWAIT n = $I2\n"), nothing, ["a waits for a.prg:2 WAIT n = $I2: n is 3; $I2 is 0"], "running", 2),
@@ -178,7 +185,7 @@ STATES: list[tuple[Callable[[], World], Callable[[World], object], list[str], st
         "stopped",
         None,
     ),
-    (lambda: chip("@1\nV100\nV200\nJ1\n"), nothing, [], "running", 0),
+    (lambda: chip("@1\nV100\nV200\nJ1\n"), nothing, ["a goes on at a.m1486:3 V100"], "running", 0),
     (lambda: chip("W9000\nV100\n"), nothing, [], "waiting", 2),
     (lambda: chip("O3\nV100\n"), nothing, ["a waits for a.m1486:2 O3: a.B3 is 0, driven by go"], "waiting", 2),
     (

@@ -55,7 +55,7 @@ class StandingProgram(NamedTuple):
 
 
 class StandingPrograms:
-    """The programs of a world that do not go on."""
+    """The programs of a world that do not go on, and where the others are."""
 
     def __init__(self, world: Simulation) -> None:
         self._world = world
@@ -67,6 +67,15 @@ class StandingPrograms:
             stand = programs.stand(self._world.now)
             if stand is not None:
                 yield self._standing(name, stand)
+
+    def going_on(self) -> Iterator[StandingProgram]:
+        """Those that execute statements, at that of now."""
+        for name, programs in self._world.programs.items():
+            self._world.sync(name)
+            now = self._world.now
+            at = programs.stack(now) if programs.state is ProgramState.RUNS and programs.stand(now) is None else ()
+            if at:
+                yield self._standing(name, ProgramStand(ProgramState.RUNS, at[0].location))
 
     def _standing(self, name: str, stand: ProgramStand) -> StandingProgram:
         if stand.location is None:
@@ -131,8 +140,8 @@ class StandingPrograms:
 
 
 class Unfinished(NamedTuple):
-    """``who``: a controller with its program, or a script of the description. ``state``: `WAITS`, or that of a held program;
-    ``what`` it waits for, or where it is held."""
+    """``who``: a controller with its program, or a script of the description. ``state``: `WAITS`, or that of its program;
+    ``what`` it waits for, or where it is."""
 
     who: str
     state: str
@@ -141,6 +150,8 @@ class Unfinished(NamedTuple):
     def __str__(self) -> str:
         if self.state == WAITS:
             return f"{self.who} waits for {self.what}"
+        if self.state == ProgramState.RUNS.value:
+            return f"{self.who} goes on at {self.what}"
         return f"{self.who} is {self.state} at {self.what}" if self.what else f"{self.who} is {self.state}"
 
 
@@ -159,20 +170,27 @@ class WithoutProgram(NamedTuple):
 
 
 def unfinished(simulation: Simulation) -> Iterator[Unfinished]:
-    """The programs that are held or wait for something other than time, then the scripts that wait, but for events, which wait
-    for the next time."""
-    for one in StandingPrograms(simulation):
+    """The programs that are held or wait for something other than time, those that go on, then the scripts that wait, but for
+    events, which wait for the next time."""
+    programs = StandingPrograms(simulation)
+    for one in programs:
         if one.stand.state is ProgramState.RUNS:
             if one.use.reads:
-                yield Unfinished(one.controller, WAITS, f"{one.where}: {'; '.join(one.present)}" if one.present else one.where)
+                yield Unfinished(one.controller, WAITS, _at(one))
         elif one.stand.state is not ProgramState.STOPPED:
             yield Unfinished(one.controller, one.stand.state.value, one.where)
+    for one in programs.going_on():
+        yield Unfinished(one.controller, one.stand.state.value, _at(one))
     events = {script.name for script in simulation.spec.scripts if script.when is not None or script.every is not None}
     for script in simulation.scripts:
         if script.waiting is not None and script.name not in events:
             asked = ", ".join(f"the answer on {pending.line}" for pending in script.waiting.asked)
             if what := script.waiting.condition or asked:
                 yield Unfinished(script.name, WAITS, what)
+
+
+def _at(program: StandingProgram) -> str:
+    return f"{program.where}: {'; '.join(program.present)}" if program.present else program.where
 
 
 def without_program(simulation: Simulation) -> Iterator[WithoutProgram]:
