@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
-from pages import PAGES, RUN, Reader, blocks, only
+from pages import PAGES, ROOT, RUN, Reader, blocks, only
+
+from steptwin.wbc.check import check
 
 WITH_CODE = [page for page in PAGES if any(block.is_done for block in blocks(page))]
 
@@ -75,6 +78,20 @@ def test_commands_are_in_blocks_that_are_run() -> None:
     texts = [block for page in PAGES for block in blocks(page) if block.language == "text"]
     hidden = [b for b in texts if any(line.lstrip("$ ").startswith("steptwin ") for line in b.code.splitlines())]
     assert [f"{block.page}:{block.line}" for block in hidden] == []
+
+
+def test_programs_on_pages_have_no_findings() -> None:
+    programs = [block for page in PAGES for block in blocks(page) if block.language == "wbc"]
+    assert len(programs) > 1
+    assert [(block.page, found.message) for block in programs for found in check(block.code).diagnostics] == []
+
+
+def test_pages_name_the_command_that_prints_what_only_the_built_page_has() -> None:
+    generated = [block for page in PAGES for block in blocks(page) if block.language.startswith("{steptwin}")]
+    assert len(generated) > 3
+    for block in generated:
+        command = re.sub(r" --(format|firmware) \S+", "", block.language.replace("{steptwin}", "steptwin"))
+        assert f"`{command}`" in (ROOT / block.page).read_text(), block.page
 
 
 def test_the_excerpt_of_a_run_is_what_it_prints(tmp_path: Path) -> None:

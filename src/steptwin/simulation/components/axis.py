@@ -58,7 +58,10 @@ class AxisSpec(NamedSpec, MoverSpec):
     drive: Terminal = key(pin_name, "what drives it: an axis of a controller, such as table.M1")
     kind: str = key(word("linear", "rotary"), "what moves", default="linear")
     unit: str | None = key(
-        text_value, "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's", default=None
+        text_value,
+        "of its positions: mm, cm, m, degree, rev or anything; default degree if rotary, else mm with pulses_per_unit or pitch, "
+        "else that of its drive",
+        default=None,
     )
     pulses_per_unit: float | None = key(
         number(0.0, above=True),
