@@ -196,7 +196,8 @@ def test_a_workpiece_that_passes_too_quickly_is_not_held() -> None:
         ("threshold = 60.0", "threshold = 90.0", "threshold = 90 kPa is not below vacuum = 80 kPa"),
         ("vacuum = 80.0", "vacuum = 102.0", "permitted are numbers above 0 to 101"),
         ('from = "infeed"', 'from = "belt"', "no conveyor is called 'belt'"),
-        ('onto = "outfeed"', 'onto = "a"', "no conveyor is called 'a'"),
+        ('onto = "outfeed"', 'onto = "a"', r"no conveyor is called 'a': a place that is no belt is a \[\[nest\]\]"),
+        ('onto = "outfeed"', 'onto = "box"', r"there are .*outfeed; a place that is no belt is a \[\[nest\]\]"),
     ],
 )
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:

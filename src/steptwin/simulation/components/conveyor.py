@@ -53,6 +53,12 @@ PICOMETRES = 10**9
 """In a millimetre: steps of the grid of a belt that no axis moves."""
 
 
+NO_CONVEYOR = Message("simulation.no-conveyor-is-called", "no conveyor is called {name!r}: {instead}")
+USE_A_NEST = Message(
+    "simulation.place-is-a-nest", "a place that is no belt is a [[nest]]; cups and jaws with an at take from it and put into it"
+)
+
+
 # ---------------------------------------------------------------------- what is built
 
 
@@ -507,7 +513,7 @@ def find_conveyor(name: str, context: ElementContext) -> Conveyor:
     """The conveyor ``name`` as it is built."""
     found = context.objects.built(CONVEYOR).get(name)
     if found is None:
-        raise Unknown(name, f"no conveyor is called {name!r}")
+        raise Unknown(name, NO_CONVEYOR(name=name, instead=USE_A_NEST()))
     return found
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from steptwin.messages import Message
+from steptwin.simulation.components.conveyor import CONVEYOR, USE_A_NEST
 from steptwin.simulation.components.elementspec import NamedSpec, Reference
 from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.values import NameOf
+
+OR_INSTEAD = Message("simulation.or-instead-hint", "{hint}; {instead}")
 
 
 def connected_names(spec: WorldSpec, controllers: Iterable[str]) -> list[list[str]]:
@@ -67,9 +71,12 @@ def _report(spec: WorldSpec, path: Path, name: str, connected: Iterable[str]) ->
     else:
         what = f"no {element}"
         there = known = [one.name for one in ELEMENTS[element].named(spec.elements[element])]
-    fix = text.replacement(path, name, text.meant(name, known))
+    meant = text.meant(name, known)
     message = f"{what} is called {name!r}{text.near(name, known)}"
-    text.wrong(path, "D009", message, f"there are {', '.join(there) or 'none'}", fix)
+    hint = f"there are {', '.join(there) or 'none'}"
+    if element == CONVEYOR.name and meant is None:
+        hint = OR_INSTEAD(hint=hint, instead=USE_A_NEST())
+    text.wrong(path, "D009", message, hint, text.replacement(path, name, meant))
 
 
 def _element_named_by(path: Path) -> str | None:
