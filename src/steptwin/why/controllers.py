@@ -37,7 +37,8 @@ HOMED = "homed"
 """Event of an axis that is at its home position."""
 POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
-NOT_HEARD = Message("why.not-heard", "`{command}` was sent while {controller} was not selected")
+NOT_HEARD = Message("why.not-heard", "`{command}` was sent while {controller} was not selected{heard}")
+HEARD_BY = Message("why.heard-by", ", but {names}")
 REFUSED = Message("why.refused", "{request}: refused, {reason}")
 WRONG_CHECKSUM = Message("why.wrong-checksum", "{request}: not heard, its check sum is wrong")
 NOT_STARTED_SINCE = Message("why.not-started-since", "{event}, and nothing has started the program since")
@@ -276,7 +277,12 @@ class ControllerCauses:
             if given is not None:
                 chose = max((one for one in frames.selecting if one < order), default=None)
                 led = [] if chose is None else [covered(self._frame(frames.selecting[chose], chose), Cover.LEVEL)]
-                link = ChainLink(record.time, controller, NOT_HEARD(command=given.code, controller=controller))
+                units = frames.requests.get(order, ())
+                heard = ", ".join(
+                    name for name, (line, unit) in self._world.objects.line_of.items() if line is on[0] and unit in units
+                )
+                text = NOT_HEARD(command=given.code, controller=controller, heard=HEARD_BY(names=heard) if heard else "")
+                link = ChainLink(record.time, controller, text)
                 by, place = partial(self._frame, record, order), Place(record.time, order, 1)
                 return Cause(link, place, by, Cover.LEVEL, partial(iter, [one for one in led if one is not None]))
         if after < self._log.begin:

@@ -257,7 +257,8 @@ class ElementCauses:
         if best is None:
             return self.rate(name, change.time) if is_integrator else None
         others: list[Cause] = []
-        has_parts = hasattr(self._all.specs.get(name), "effect")
+        spec = self._all.specs.get(name)
+        has_parts = hasattr(spec, "effect") or isinstance(spec, MOVED_BY_AXES)
         for signal in names if is_integrator else self.followed(name) if has_parts else ():
             cause = found.get(signal) or (None if is_integrator else self._of_signal(signal, change, change.time))
             if cause is not None and signal != best:

@@ -96,6 +96,16 @@ class InterruptCauses:
             if found is not None:
                 yield found
 
+    def late(self, controller: str, index: int, reads: Sequence[Cause], place: Place) -> Iterator[Cause]:
+        """The statement for whose end an interrupt waited after its event."""
+        programs = self._all.programs
+        pins = (one.name for one in programs.use(controller, index).reads if one.name)
+        lasting = max((programs.filtering(controller, one) for one in pins), default=0)
+        soon = lasting + 2 * self._world.programs[controller].statement_time
+        lasted = index > 0 and self._log.executed[controller].times[index - 1] < place.time - soon
+        if lasted and programs.use(controller, index - 1).waits and reads and reads[0].place.time < place.time - soon:
+            yield programs.decided(controller, index - 1, Place(place.time, place.order, 3 * index), True)
+
     def handlers(self, controller: str, text: str) -> Sequence[range]:
         """The statements of each interrupt of a text, with the one that it begins with."""
         key = controller, text

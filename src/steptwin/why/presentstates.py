@@ -88,7 +88,7 @@ class PresentStates:
         """Those for which the program of a controller waits, or which the loop reads in which it is."""
         programs, last = self._causes.programs, self._log.last_executed(controller, self._at)
         use = programs.use(controller, last)
-        is_waiting = self.waits(controller, use)
+        is_waiting = self.waits(controller, use) and programs.polling(controller, last) is None
         loop = [] if is_waiting else programs.conditions_of_loop(controller, last, has_waits=True)
         reads = use.reads if is_waiting else [one for number in loop for one in programs.use(controller, number).reads]
         if is_waiting and not reads:
@@ -302,7 +302,6 @@ class PresentStates:
             yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)), is_stand=True)
             return [*((owner, one) for one in use.reads), *(yield from self._interrupts(owner, wanted))]
         if conditions:
-            widest = max(conditions, key=lambda one: len(programs.use(owner, one).governs))
-            words = statement(log, programs.written_at(owner, widest))
+            words = programs.loop(owner, conditions)
             yield ChainLink(at, owner, IS_IN_A_LOOP(controller=owner, statement=words), is_stand=True)
         return [(owner, one) for number in conditions for one in programs.use(owner, number).reads]

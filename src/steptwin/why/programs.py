@@ -251,6 +251,37 @@ class ProgramCauses:
         last = {self._log.executed[controller].locations[one]: one for one in loop}
         return [one for one in last.values() if (use := self.use(controller, one)).governs or use.is_loop]
 
+    def polling(self, controller: str, index: int) -> int | None:
+        """The number of the statement since which a program does nothing but go round in a loop that reads something; None where
+        it does not."""
+        conditions = self.conditions_of_loop(controller, index)
+        executed, programs = self._log.executed[controller], self._world.programs[controller]
+        before = self.last_of(controller, (executed.locations[index],), index)
+        if before is None or not any(self.use(controller, one).reads for one in conditions):
+            return None
+        text = executed.locations[index].text
+        numbers = [one.number for one in executed.locations[before:index]]
+        loop = range(min(numbers), max(numbers) + 1)
+        uses = [programs.use(StatementLocation(text, one)) for one in loop]
+        if any(one.writes or (one.waits and one.reads) for one in uses):
+            return None
+        handlers = self._all.interrupts.handlers(controller, text)
+        first = index
+        for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
+            where = executed.locations[earlier]
+            if where.text == text and where.number in loop:
+                first = earlier
+            elif not any(where.number in one for one in handlers):
+                return first
+        if index < MOST_UNDECIDED:
+            self._log.lack()
+        return first if first == 0 else None
+
+    def loop(self, controller: str, conditions: Sequence[int]) -> MessageText:
+        """A loop in words, by the condition that decides about most statements."""
+        widest = max(conditions, key=lambda one: len(self.use(controller, one).governs))
+        return statement(self._log, self.written_at(controller, widest))
+
     def written_at(self, controller: str, index: int) -> Executed:
         """An executed statement; the condition of a loop where it is written: at its beginning."""
         executed, use = self._log.executed[controller][index], self.use(controller, index)
@@ -312,7 +343,7 @@ class ProgramCauses:
                 came = self._came(controller, after)
                 if came is not None and came.place.time >= ended.time:
                     return came  # the wait was over before that
-                return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), True)
+                return self.decided(controller, earlier, Place(ended.time, ended.order, 3 * after), True)
             resumed = self._resumed(controller, here.order, ended)
             if resumed is not None:
                 return resumed
@@ -320,13 +351,13 @@ class ProgramCauses:
                 first, there = self.begin_of_wait(controller, earlier), Place(ended.time, ended.order, 3 * after)
                 began = Place(executed[first].time, executed[first].order, 3 * first)
                 came = any(cause.place > began for cause in self._read(controller, first, there))
-                return self._decided(controller, first, there, True) if came else self._did_not_wait(controller, earlier)
+                return self.decided(controller, first, there, True) if came else self._did_not_wait(controller, earlier)
             if use.waits and not use.governs and (ignored := self._ignored(controller, earlier)) is not None:
                 text = DID_NOT_WAIT(statement=statement(self._log, here), levels=[ignored.link.text])
                 place = Place(here.time, here.order, 3 * earlier + 2)
                 return Cause(ChainLink(here.time, controller, text), place, lambda: ignored, Cover.PROGRAM)
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
-                return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2))
+                return self.decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2))
             after = earlier
         if index >= MOST_UNDECIDED:
             here, text = executed[after], FARTHER(most=MOST_UNDECIDED)
@@ -377,7 +408,7 @@ class ProgramCauses:
             return WAS_EXECUTED(statement=statement(self._log, words))
         return DECIDED(statement=statement(self._log, words), next=statement(self._log, executed[after]))
 
-    def _decided(self, controller: str, index: int, place: Place, has_ended: bool = False) -> Cause:
+    def decided(self, controller: str, index: int, place: Place, has_ended: bool = False) -> Cause:
         use, words = self.use(controller, index), statement(self._log, self.written_at(controller, index))
         text = ENDED(statement=words) if has_ended else self._decision(controller, index)
         link = ChainLink(place.time, controller, text)
@@ -450,7 +481,8 @@ class ProgramCauses:
             before = (one for one in range(index - 1, -1, -1) if times[one] == place.time)
             acted = next((one for one in before if set(axes) & set(self.use(controller, one).writes)), None)
             by = None if acted is None else self.statement(controller, acted)
-            return reads or (by,)  # what it broke into has not led to an interrupt
+            late = self._all.interrupts.late(controller, index, reads, place)
+            return (*late, *reads) or (by,)  # what it broke into has not led to an interrupt
         before = None if self.use(controller, index).waits else self._executed_before(controller, index)
         latest = place.time - LONGEST_REACTION_NS
         is_recent = reads and (before is None or reads[0].place > before or reads[0].place.time > latest)
@@ -505,7 +537,7 @@ class ProgramCauses:
             case ResourceKind.PIN:
                 every = [name for name in self._log.first_levels if name.startswith(f"{controller}.")]
                 read = [f"{controller}.{resource.name}"] if resource.name else every
-                lasts = self._filter(controller, resource.name)
+                lasts = self.filtering(controller, resource.name)
                 seen = self._seen(controller, resource.name, time, before, lasts) if lasts else None
                 last = seen if lasts else self._all.last(read, time, before=before)
                 return self._all.lasting(read, time, last, before)
@@ -563,7 +595,7 @@ class ProgramCauses:
     def unseen(self, controller: str, pin: str, time: Nanos, after: Nanos = -1) -> FoundCause:
         """The last change of an input by a moment, after another one, that its filter has not let in; of one that bounced the
         longest level."""
-        signal, lasts, later = f"{controller}.{pin}", self._filter(controller, pin), time
+        signal, lasts, later = f"{controller}.{pin}", self.filtering(controller, pin), time
         level: float | None = None  # that its filter let in last
         short: list[tuple[Change, Nanos]] = []
         for change in self._log.changes_before(signal, time) if lasts else ():
@@ -592,10 +624,10 @@ class ProgramCauses:
 
     def first(self, controller: str, pin: Resource) -> Cause:
         """The level of an input before the log, which its filter lets in."""
-        lasts = self._filter(controller, pin.name)
+        lasts = self.filtering(controller, pin.name)
         return self._all.first(f"{controller}.{pin.name}", FILTERED(ms=lasts / MILLISECOND) if lasts else None)
 
-    def _filter(self, controller: str, pin: str) -> Nanos:
+    def filtering(self, controller: str, pin: str) -> Nanos:
         """How long a level must last at an input before a program sees it."""
         return self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
 

@@ -23,7 +23,7 @@ from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered
 from steptwin.why.controllers import axis_of
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast, text_of_question, without_not
-from steptwin.why.presentstates import PresentStates
+from steptwin.why.presentstates import IS_IN_A_LOOP, PresentStates
 from steptwin.why.programs import WAITS
 from steptwin.why.resting import RestingCauses
 from steptwin.why.sentences import IS_NUMBER, statement, value_with_unit
@@ -278,8 +278,10 @@ class Why:
                 if (is_later or wanted.kind is ResourceKind.AXIS) and self.past.tried(controller, wanted, at) is None:
                     found[controller] = True
             elif (controller, wanted) in waiting and wanted.kind is (ResourceKind.VALUE if since is None else ResourceKind.PIN):
-                use, begun = programs.use(controller, index), log.executed[controller][index].time
-                if use.waits and use.reads and (since or 0) <= begun < at - log.world.programs[controller].statement_time:
+                use = programs.use(controller, index)
+                begin = index if use.waits and use.reads else programs.polling(controller, index)
+                begun = at if begin is None else log.executed[controller][begin].time
+                if (since or 0) <= begun < at - log.world.programs[controller].statement_time:
                     found.setdefault(controller, False)
         return found
 
@@ -404,19 +406,21 @@ class Why:
         present = yield from self._present(at)
         links = list(present.awaited(controller))
         is_done = at - here.time > log.world.programs[controller].statement_time
-        if is_done and use.waits and present.waits(controller, use):
+        polling = causes.programs.polling(controller, index)
+        if polling is not None:
+            loop = causes.programs.conditions_of_loop(controller, index)
+            state = IS_IN_A_LOOP(controller=controller, statement=causes.programs.loop(controller, loop))
+            since = log.executed[controller][polling].time
+        elif is_done and use.waits and present.waits(controller, use):
             state = WAITS(controller=controller, statement=text)
         elif is_done and causes.programs.is_last(controller, index):
             state = PROGRAM_IS(controller=controller, held=causes.programs.end(controller, index))
         else:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
-        if not use.waits or not is_done:
-            first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
-            loop = causes.programs.conditions_of_loop(controller, index, has_waits=True)
-            read = [(one, number) for number in loop for one in causes.programs.use(controller, number).reads]
-            off = yield from self._switched_off([(controller, one) for one, _ in read], at)
-            led = [causes.programs.resource(controller, one, number, at) for one, number in read]
-            first = along(first, [*(covered(one, Cover.LEVEL) for one in led), *off])
+        unheard = None if present.waits(controller, use) else causes.controllers.unheard(controller, None, at, here.time)
+        if polling is not None or not use.waits or not is_done:
+            going_on = yield from self._going_on(controller, index, index if polling is None else polling, at)
+            first = along(going_on, [unheard])
             return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
         waiting = causes.programs.statement(controller, index)
@@ -432,8 +436,19 @@ class Why:
         first = covered(last, Cover.LEVEL) or resting or waiting
         standing = (yield from self.resting.standing(pins, at)) if last is None and resting is None else None
         lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
-        first = along(first, [waiting, *lasting])
+        first = along(first, [waiting, *lasting, unheard])
         return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
+
+    def _going_on(self, controller: str, index: int, begun: int, at: Nanos) -> Generator[None, None, FoundCause]:
+        """Cause for which a program that waits at no statement has come to one, or to the loop in which it is since ``begun``,
+        with what the conditions of the loop read."""
+        programs = self.causes.programs
+        loop = programs.conditions_of_loop(controller, index, has_waits=True)
+        read = [(one, number) for number in loop for one in programs.use(controller, number).reads]
+        off = yield from self._switched_off([(controller, one) for one, _ in read], at)
+        led = [programs.resource(controller, one, number, at) for one, number in read]
+        first = covered(programs.statement(controller, begun), Cover.PROGRAM)
+        return along(first, [*(covered(one, Cover.LEVEL) for one in led), *off])
 
     def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:
         """Whether a fault holds a pin, or what drives it: the run without the fault proves it."""
