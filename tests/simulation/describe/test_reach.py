@@ -172,3 +172,65 @@ def test_switches_beyond_the_stroke_are_warned_of() -> None:
     assert warnings(text) == [("this switch is never on: lift goes from 0 to 50", "above = 51.0")]
     (one,) = diagnose("m.toml", text, no_files).findings
     assert one.hint == "let it change between 0 and 50, or give lift another travel"
+
+
+PUSHER = """\
+[[mic488]]
+name = "m"
+[[conveyor]]
+name = "line"
+length = 600
+run = "m.OUT1"
+speed = 100
+workpiece = [40, 30, 60]
+at = [0, 0, 100]
+along = "{along}"
+[[cylinder]]
+name = "reject"
+extend = "m.OUT2"
+stroke = {stroke}
+at = {at}
+along = "{push}"
+[[body]]
+name = "blade"
+on = "reject"
+size = [10, 10, 40]
+pushes = true
+"""
+FROM = {
+    "+y": ("+x", [300, -80, 110]),
+    "-y": ("-x", [-300, 80, 110]),
+    "+x": ("+y", [-80, 300, 110]),
+    "-x": ("-y", [80, -300, 110]),
+}
+
+
+@pytest.mark.parametrize("push", FROM)
+@pytest.mark.parametrize(
+    ("stroke", "missing"),
+    [(94, None), (95.5, "14.5"), (100, "10"), (110, "0"), (110.001, None)],
+    ids=["on the belt", "just over the edge", "too short", "exactly at the edge", "long enough"],
+)
+def test_a_pusher_that_leaves_workpieces_over_the_edge_of_a_belt(push: str, stroke: float, missing: str | None) -> None:
+    along, at = FROM[push]
+    text = PUSHER.format(along=along, stroke=stroke, at=at, push=push)
+    message = f"blade does not push workpieces off line: their middle comes to {missing} mm before its edge"
+    assert warnings(text) == ([] if missing is None else [(message, "[[body]]")])
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("[40, 30, 60]", "[40, 130, 60]"),
+        ("workpiece = [40, 30, 60]\n", ""),
+        ("[300, -80, 110]", "[700, -80, 110]"),
+        ("[300, -80, 110]", "[300, -80, 170]"),
+        ("[300, -80, 110]", "[300, -60, 110]"),
+        ("pushes = true", ""),
+    ],
+    ids=["wider than the belt", "of no known size", "beside the belt", "above them", "already in one", "no pusher"],
+)
+def test_no_warning_of_a_pusher_where_nothing_is_certain(old: str, new: str) -> None:
+    text = PUSHER.format(along="+x", stroke=100, at=[300, -80, 110], push="+y")
+    assert len(warnings(text)) == 1
+    assert warnings(text.replace(old, new)) == []

@@ -1,4 +1,5 @@
-"""Warnings about cups and jaws that never come to a workpiece, and beams that never see what they are for.
+"""Warnings about cups and jaws that never come to a workpiece, beams that never see what they are for, belts that go on
+elsewhere, and pushers that do not go far enough.
 
 All that moves may be anywhere within its travel, independently; without a known travel anywhere. So a warning holds whatever the
 machine does, and one that is not given says nothing.
@@ -17,6 +18,7 @@ from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.conveyor import CONVEYOR
+from steptwin.simulation.components.conveyortable import ConveyorSpec
 from steptwin.simulation.components.frames import bodies_on
 from steptwin.simulation.components.gripper import GRIPPER
 from steptwin.simulation.components.mount import to_nm
@@ -42,10 +44,16 @@ SEES_NOTHING = Message("simulation.beam-never-sees", "{beam} never sees {what}: 
 BELTS_APART = Message(
     "simulation.belts-apart", "{belt} goes on to {next}, but along {axis} its end stays {by:g} mm away from the beginning of that"
 )
+NOT_PUSHED_OFF = Message(
+    "simulation.not-pushed-off", "{pusher} does not push workpieces off {belt}: their middle comes to {by:g} mm before its edge"
+)
+PUSH_FARTHER = Message(
+    "simulation.push-farther-hint", "a workpiece leaves when its middle is beyond the edge: more than {by:g} mm farther"
+)
 
 
 def check_reach(text: TomlText, objects: BuiltObjects) -> None:
-    """Warn of cups, jaws and beams that are of no use."""
+    """Warn of cups, jaws, beams, belts and pushers that do not do what they are for."""
     _Reach(text, objects).check()
 
 
@@ -124,6 +132,7 @@ class _Reach:
             self._check_tools()
         self._check_beams()
         self._check_belts()
+        self._check_pushers()
 
     # ------------------------------------------------------------------ cups and jaws
 
@@ -221,6 +230,49 @@ class _Reach:
                 by = miss.by / NM_PER_MM
                 message = BELTS_APART(belt=belt.name, next=following.name, by=by, axis=AXES[miss.axis])
                 self._text.warn((*belt.path, "next"), DOUBTFUL, message)
+
+    # ------------------------------------------------------------------ pushers
+
+    def _check_pushers(self) -> None:
+        """Warn of those that let workpieces hang over the edge of a belt, and leave them on it."""
+        for spec in self._described.of(BODY):
+            for belt in self._described.of(CONVEYOR) if spec.pushes else ():
+                missing = self._missing(self._bodies[spec.name], belt) if belt.name in self._frames else None
+                if missing is not None:
+                    by = round(missing / NM_PER_MM, 3)
+                    message = NOT_PUSHED_OFF(pusher=spec.name, belt=belt.name, by=by)
+                    self._text.warn(spec.path, DOUBTFUL, message, PUSH_FARTHER(by=by))
+
+    def _missing(self, pusher: Body, belt: ConveyorSpec) -> float | None:
+        """How far before its edge the workpieces in the middle of a belt have their own middle when a pusher has gone as far as
+        it may; None unless all of them hang over the edge then, and stay."""
+        its, point = self._together(pusher, self._point(belt.name))
+        (along, sign), edge, margin = belt.towards(), to_nm(belt.width) / 2, 4 * ROUNDING_NM
+        across, ends = 1 - along, sorted((0, sign * to_nm(belt.length)))
+        coming = self._coming_to(belt)
+        if not coming or point.high[across] - point.low[across] > margin:
+            return None  # it moves across itself
+        is_beside = its.high[along] <= point.low[along] + ends[0] or its.low[along] >= point.high[along] + ends[1]
+        highest = point.high[Z] + max(to_nm(one.workpiece[-1]) for one in coming)
+        if is_beside or its.high[Z] <= point.low[Z] or its.low[Z] >= highest:
+            return None
+        halves = [to_nm((*one.workpiece[:-1], one.workpiece[0])[one.towards().axis == along]) / 2 for one in coming]
+        low, high = its.low[across] - point.low[across], its.high[across] - point.high[across]
+        shape = pusher.shape
+        thick = 2 * (shape.half[across] if isinstance(shape, Box) else shape.radius)
+        for first, last in ((low + thick, high), (thick - high, -low)):  # its face, on the way to one side and to the other
+            left = [edge - last - half for half in halves]
+            comes = all(first <= margin - half and half <= edge for half in halves)
+            if comes and all(-margin <= by < half for by, half in zip(left, halves, strict=True)):
+                return max(0.0, *left)
+        return None
+
+    def _coming_to(self, belt: ConveyorSpec) -> list[ConveyorSpec]:
+        """The conveyors whose workpieces come along one, as far as they say how large those are."""
+        found = {belt.name: belt}
+        for _ in self._described.of(CONVEYOR):
+            found |= {one.name: one for one in self._described.of(CONVEYOR) if one.next in found}
+        return [one for one in found.values() if self._text.is_given((*one.path, "workpiece"))]
 
     # ------------------------------------------------------------------ where things may be
 
