@@ -25,8 +25,8 @@ export function vacuum(build: Builder, { cups }: Scene): void {
 /** Two jaws below their drive, each with its face half of the way from the middle, and their tips at the origin. */
 export function gripper(build: Builder, element: Element): void {
   const stroke = element.drawing?.length || 20;
-  const thick = between(4, 0.25 * stroke, 16);
-  const [long, wide] = [between(20, 1.2 * stroke, 70), between(8, 0.6 * stroke, 30)];
+  const thick = between(2, 0.25 * stroke, 16);
+  const [long, wide] = [between(10, 1.2 * stroke, 70), between(5, 0.6 * stroke, 30)];
   build.box([0, 0, long + thick], [stroke + 3 * thick, 1.4 * wide, 2 * thick], "drive");
   for (const side of [1, -1])
     build.box([side * (stroke / 2 + thick / 2), 0, long / 2], [thick, wide, long], "moving", {

@@ -156,7 +156,7 @@ function turntable(build: Builder, { scene, axis, element }: Known): void {
 /** A tube, out of which a rod comes with its plate; contacts of its ends are on the tube. */
 function cylinder(build: Builder, { name, outputs, drawing }: Element): void {
   const stroke = drawing?.length || 50;
-  const wide = between(14, 0.45 * stroke, 60);
+  const wide = between(8, 0.25 * stroke, 50);
   const tube = stroke + 0.9 * wide;
   build.rod([-tube / 2 - 0.2 * wide, 0, 0], 0, tube, wide, "rail");
   for (const end of [-0.32 * wide, 0.08 * wide - tube]) build.rod([end, 0, 0], 0, 0.28 * wide, 1.18 * wide, "frame");
