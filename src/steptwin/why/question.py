@@ -10,7 +10,6 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.later import finish
 from steptwin.messages import Message, MessageText
-from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
@@ -139,7 +138,7 @@ class Why:
         resting = resting or (yield from self.resting.standing(signals, at))
         behind = self.past.behind(waited, at)
         is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind)
-        is_kept = is_kept or any(isinstance(self.causes.contacts.get(name), Sensor) for name in behind)
+        is_kept = is_kept or any(map(self.causes.workpieces.awaits, behind))
         is_kept = is_kept or self.causes.holding.depends(behind) or any(self.log.hold(name, at) for name in behind)
         if is_kept and self.log.reaches_begin():  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)

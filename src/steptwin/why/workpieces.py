@@ -11,6 +11,8 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltsensor import Sensor
+from steptwin.simulation.components.carrier import HELD as HELD_OUT
+from steptwin.simulation.components.carrier import PLACE, CarrierSpec
 from steptwin.simulation.components.conveyortable import BELT_STOP, FEED, RUN, ConveyorSpec
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
@@ -216,7 +218,29 @@ class WorkpieceCauses:
         elif isinstance(contact, Sensor):
             passed = {one for key in seen if key[0] == signal for one in seen[key]}
             found = self._lacking(belt, contact.at_mm, passed, change, since)
+        elif isinstance(spec := self._all.specs.get(belt), CarrierSpec) and isinstance(
+            self._all.specs.get(spec.source or ""), ConveyorSpec
+        ):
+            found = iter([self._taken_before(spec, change)])
         yield from (one for one in found if one is not None)
+
+    def awaits(self, signal: str) -> bool:
+        """Whether a signal says that a workpiece has come to a sensor, or to what takes it."""
+        return isinstance(self._all.contacts.get(signal), Sensor) or isinstance(
+            self._all.specs.get(signal.partition(".")[0]), CarrierSpec
+        )
+
+    def _taken_before(self, spec: CarrierSpec, change: Change) -> FoundCause:
+        """The last event before a change by which a workpiece was taken from where something would take one that is switched on,
+        if none is there any more."""
+        belt, takes = (
+            spec.source or "",
+            [name for name in self._all.parts[spec.name].block.levels if name not in (HELD_OUT, PLACE)],
+        )
+        if not all(self._all.holding.level(PinName(spec.name, name), change.time) for name in takes):
+            return None
+        lasts = self._last_events(belt, (), change)
+        return None if lasts is None or self._here(belt, lasts, change) else self._taken(belt, lasts, change, -1)
 
     def _lacking(
         self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos, onto: frozenset[str] = frozenset()
@@ -227,33 +251,49 @@ class WorkpieceCauses:
         if stopped is not None:
             yield stopped
             return
-        events = list(islice(self._log.events_before(belt, change), MOST_EVENTS))
-        names = dict.fromkeys(self._workpiece(one) for one in events)
-        lasts = [last for one in names if one not in seen and (last := next(self._log.events_before(one, change), None))]
-        here = [one for one in lasts if belt in self._named(one) and self._what(one) not in ("leaves", FALLS, HELD)]
-        here = [one for one in here if not self._removed(one, change)]
-        came = {self._workpiece(one) for one in events if self._what(one) in COMES}
-        if self._log.meetings.there[belt] - came:  # where they have been is not known
-            self._log.lack()
+        lasts = self._last_events(belt, seen, change)
+        if lasts is None:
             return
+        here = self._here(belt, lasts, change)
         held = [one for one in here if self._what(one) == STANDS and self._place(one) < place]
         if held:
             yield self.rests(self._workpiece(max(held, key=self._place)), change)
         if here:
             return
-        gone = [one for one in lasts if one.time > since and self._what(one) != "leaves"]
-        gone = [one for one in gone if belt in self._places(self._workpiece(one), one)]
-        acts = [act for one in lasts if (act := self._removed(one, change)) is not None and act.time > since]
-        if acts:
-            yield covered(acted(max(acts, key=lambda act: (act.time, act.order))), Cover.LEVEL)
-        elif gone:
-            yield covered(self.event(max(gone, key=lambda one: (one.time, one.order))), Cover.LEVEL)
+        taken = self._taken(belt, lasts, change, since)
+        if taken is not None:
+            yield taken
         else:
             feed = list(self._all.sources(PinName(belt, FEED)))
             yield covered(self._all.last(feed, change.time, NOT_FED_SINCE(name=belt)) if feed else None, Cover.LEVEL)
             for name, spec in self._all.specs.items():
                 if getattr(spec, "next", None) == belt and name not in onto:
                     yield from self._lacking(name, math.inf, seen, change, since, onto | {belt, name})
+
+    def _last_events(self, belt: str, seen: Collection[str], change: Change) -> list[Change] | None:
+        """The last event before a change of each workpiece that has been on a belt, but those that have been ``seen``; None where
+        it is not known where some have been."""
+        events = list(islice(self._log.events_before(belt, change), MOST_EVENTS))
+        came = {self._workpiece(one) for one in events if self._what(one) in COMES}
+        if self._log.meetings.there[belt] - came:
+            self._log.lack()
+            return None
+        names = dict.fromkeys(self._workpiece(one) for one in events)
+        return [last for one in names if one not in seen and (last := next(self._log.events_before(one, change), None))]
+
+    def _here(self, belt: str, lasts: Collection[Change], change: Change) -> list[Change]:
+        """Those of the last events of workpieces after which they are on a belt."""
+        here = [one for one in lasts if belt in self._named(one) and self._what(one) not in ("leaves", FALLS, HELD)]
+        return [one for one in here if not self._removed(one, change)]
+
+    def _taken(self, belt: str, lasts: Collection[Change], change: Change, since: Nanos) -> FoundCause:
+        """The last event since a moment by which a workpiece was taken from a belt, or the action of somebody."""
+        gone = [one for one in lasts if one.time > since and self._what(one) != "leaves"]
+        gone = [one for one in gone if belt in self._places(self._workpiece(one), one)]
+        acts = [act for one in lasts if (act := self._removed(one, change)) is not None and act.time > since]
+        if acts:
+            return covered(acted(max(acts, key=lambda act: (act.time, act.order))), Cover.LEVEL)
+        return covered(self.event(max(gone, key=lambda one: (one.time, one.order))), Cover.LEVEL) if gone else None
 
     def _workpiece(self, event: Change) -> str:
         return str(dict(self._log.record(event).facts)["workpiece"])
