@@ -89,6 +89,29 @@ class InterruptCauses:
         changes = ((self._log.level(pin, times[came]), one) for pin in pins for one in self._log.changes_before(pin, until))
         return any(one.time > since and one.value == level for level, one in changes)
 
+    def edges(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """The changes by which an interrupt came: of a pin the last one to the level that its switch makes it notice."""
+        programs, use = self._all.programs, self._all.programs.use(controller, index)
+        for one in use.reads:
+            found = programs.resource(controller, one, index, place.time, place.order)
+            level = self._noticed(controller, use, place)
+            while (
+                found is not None and level is not None and self._log.level(f"{controller}.{one.name}", found.place.time) != level
+            ):
+                found = programs.resource(controller, one, index, found.place.time, found.place.order)
+            if found is not None:
+                yield found._replace(cover=Cover.LEVEL)
+
+    def _noticed(self, controller: str, use: StatementUse, place: Place) -> float | None:
+        """The level that a pin had to take so that an interrupt came; None where it may be either, or is not known."""
+        now = self._world.now
+        for switch in use.acts_by if use.edges else ():
+            written = self._all.programs.resource(controller, switch, self._log.last_executed(controller, now) + 1, now)
+            value = self._world.programs[controller].read(switch.name, now)
+            if value is not None and (written is None or written.place < place):
+                return dict(use.edges).get(value)
+        return None
+
     def enabled(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """Causes for which an interrupt was enabled."""
         for one in self._all.programs.use(controller, index).acts_by:

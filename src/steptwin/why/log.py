@@ -51,6 +51,7 @@ OF_MECHANICS = ("stall", "hard-stop", "collision", FALL)
 WORKPIECE = "workpiece"
 JAMS = ("jams", "free again")
 """Events of a pusher after which what moves it stands, or moves again."""
+WRONG_DATA = "wrong-data"
 BEGINS = ("power-on", "restart", "reset", "file")
 """Events after which the program of a controller begins anew."""
 STATEMENTS_AT_ONCE = 2000
@@ -73,6 +74,8 @@ class ExecutedStatements:
         self._controller = controller
         self.times, self.orders = array("q"), array("q")
         self.locations: list[StatementLocation] = []
+        self.refused = set[int]()
+        """The numbers of those that a chip refused as wrong data: they have done nothing."""
 
     def __len__(self) -> int:
         return len(self.times)
@@ -258,6 +261,9 @@ class CauseLog:
             case "event":
                 axis = str(dict(record.facts).get("axis", ""))
                 self.axis_events[record.controller, axis].append(Change(record.time, 0.0, group, len(records), order))
+                executed = self.executed.get(record.controller)
+                if record.subject == WRONG_DATA and executed and executed.times[-1] == record.time:
+                    executed.refused.add(len(executed) - 1)
             case "fault":
                 self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)
@@ -451,9 +457,9 @@ class CauseLog:
         return last
 
     def last_of(self, controller: str, locations: Collection[StatementLocation], before: int) -> int | None:
-        """The number of the last one of some statements that was executed before a number."""
-        executed = self.executed[controller].locations
-        return next((one for one in range(before - 1, -1, -1) if executed[one] in locations), None)
+        """The number of the last one of some statements that was executed, and not refused, before a number."""
+        executed, refused = self.executed[controller].locations, self.executed[controller].refused
+        return next((one for one in range(before - 1, -1, -1) if executed[one] in locations and one not in refused), None)
 
     def executed_before(self, controller: str, locations: Collection[StatementLocation]) -> Nanos | None:
         """When one of some statements was last executed before the log, as far as that is known."""
@@ -568,7 +574,9 @@ class CauseLog:
         began = [time for time in self._fault_times.get(name, ()) if time <= until]
         latest = began[-1] if began else until
         records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= latest)
-        its = sorted((one for one in records if one.subject == name), key=lambda one: one.time)
+        active = self.world.objects.faults.find(name)
+        end = None if active is None else active.end
+        its = sorted((one for one in records if one.subject == name and one.time != end), key=lambda one: one.time)
         found = next((one for one in reversed(its) if one.time in began), None)
         if found is None and its:
             self.lack()

@@ -475,14 +475,15 @@ class ProgramCauses:
     def _of_decision(self, controller: str, index: int, place: Place) -> Sequence[FoundCause]:
         """The changes by which what a condition reads has had its values since; of one that is new, also what led to it, if that
         came later."""
-        reads = self._all_read(controller, index, place)
         if self.use(controller, index).waits and self.use(controller, index).governs:
+            reads = list(self._all.interrupts.edges(controller, index, place))
             times, axes = self._log.executed[controller].times, [one for one in self.use(controller, index).reads if one.name]
             before = (one for one in range(index - 1, -1, -1) if times[one] == place.time)
             acted = next((one for one in before if set(axes) & set(self.use(controller, one).writes)), None)
             by = None if acted is None else self.statement(controller, acted)
             late = self._all.interrupts.late(controller, index, reads, place)
             return (*late, *reads) or (by,)  # what it broke into has not led to an interrupt
+        reads = self._all_read(controller, index, place)
         before = None if self.use(controller, index).waits else self._executed_before(controller, index)
         latest = place.time - LONGEST_REACTION_NS
         is_recent = reads and (before is None or reads[0].place > before or reads[0].place.time > latest)

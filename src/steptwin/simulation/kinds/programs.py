@@ -85,6 +85,8 @@ class StatementUse(NamedTuple):
     """Values by which the motion that it begins is made, such as a velocity."""
     keeps: bool = False
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
+    edges: tuple[tuple[float, float], ...] = ()
+    """Levels that the pin which it reads has to take, by values of what it acts by; with another value it may be either."""
 
 
 class WriteUse(NamedTuple):

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
 from steptwin.wbc import steps as s
+from steptwin.wbc.registers import PREDEFINED
 
 _PINS = frozenset({"OUT", "IN", "AIN"})
 _OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM"})
@@ -14,6 +15,7 @@ _OF_ENCODER = frozenset({"ENC", "XENC"})
 _ANY_AXIS = Resource(ResourceKind.AXIS, "")
 _ANY_PIN = Resource(ResourceKind.PIN, "")
 _PROGRAM = Resource(ResourceKind.PROGRAM, "")
+_EDGES = ((PREDEFINED["RIS"], 1.0), (PREDEFINED["FALL"], 0.0))
 
 
 def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
@@ -32,6 +34,7 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
         jumps=step.target if isinstance(step, s.JumpStep) else None,
         acts_by=tuple(_acted_by(step)),
         keeps=keeps,
+        edges=_EDGES if isinstance(step, s.InterruptStep) and step.event.input else (),
     )
 
 
