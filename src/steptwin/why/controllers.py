@@ -318,6 +318,8 @@ class ControllerCauses:
         stopped."""
         event, held = self._log.last_begin(controller, at, LAST), self._all.programs.held(controller, at)
         since = held.place.time if since is None and held is not None and held.place.order >= 0 else since
+        if event is None and since is not None and since < self._log.begin:
+            self._log.never_happened(*(f"event {one}" for one in BEGINS))
         if event is None or event.position < 0 or since is None or event.time <= since:
             return None
         text, begun = self._not_done(controller, wanted, event, at), self.begun(controller, event)
