@@ -85,7 +85,9 @@ WBC_USES = [
     StatementUse(jumps=17),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
-    StatementUse((pin("IN6"),), waits=True, governs=range(20, 22), acts_by=(value("CFGINT_IN6"),)),  # up to its RETURN
+    StatementUse(
+        (pin("IN6"),), waits=True, governs=range(20, 22), acts_by=(value("CFGINT_IN6"),), edges=((1, 1.0), (2, 0.0))
+    ),  # up to its RETURN
     StatementUse((), (value("x"),)),
     StatementUse(),
     StatementUse((axis(3),), waits=True, governs=range(23, 24), acts_by=(value("CFGINT_M3"),)),
