@@ -245,11 +245,11 @@ class ControllerCauses:
         return (one for one in found if after < one.place.time <= until and one.place.order < before)
 
     def sends(self, what: Bytes, time: Nanos) -> str:
-        """What a client sends in words, whether or not it comes so."""
+        """The request of a client in words, whether or not it comes so."""
         return self._log.frames.words(what.line, f"{what.place}/sent", what.data, time)
 
     def altered(self, record: TraceRecord) -> MessageText | str | None:
-        """What went to the controllers of a line as a fault altered it, in words; None for another fault."""
+        """The request to controllers of a line that a fault altered or lost, as it was sent, in words; None for another fault."""
         line, places = record.controller, getattr(record.value, "values", {}).get("place", ())
         if line not in self._world.lines or TOWARDS_THE_TWIN.id not in [one["id"] for one in places if isinstance(one, dict)]:
             return None

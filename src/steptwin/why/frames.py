@@ -46,7 +46,7 @@ class Frames:
         return self.words(record.controller, record.subject.rpartition("/")[0], record.data(), record.time)
 
     def words(self, line: str, client: str, data: bytes, time: Nanos) -> str:
-        """What a client sends over a line in words, whether or not it comes so."""
+        """The request of a client over a line in words, whether or not it comes so."""
         self._read.clear()
         self.traffic[line].frame(time, client, FrameDirection.IN, data)
         return "; ".join(one.meaning for one in self._read) if self._read else data.decode("ascii", "backslashreplace")

@@ -92,9 +92,9 @@ class InterruptCauses:
     def edges(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """The changes by which an interrupt came: of a pin the last one to the level that its switch makes it notice."""
         programs, use = self._all.programs, self._all.programs.use(controller, index)
+        level = self._noticed(controller, use, place)
         for one in use.reads:
             found = programs.resource(controller, one, index, place.time, place.order)
-            level = self._noticed(controller, use, place)
             while (
                 found is not None and level is not None and self._log.level(f"{controller}.{one.name}", found.place.time) != level
             ):

@@ -218,10 +218,8 @@ class WorkpieceCauses:
         elif isinstance(contact, Sensor):
             passed = {one for key in seen if key[0] == signal for one in seen[key]}
             found = self._lacking(belt, contact.at_mm, passed, change, since)
-        elif isinstance(spec := self._all.specs.get(belt), CarrierSpec) and isinstance(
-            self._all.specs.get(spec.source or ""), ConveyorSpec
-        ):
-            found = iter([self._taken_before(spec, change)])
+        elif isinstance(carrier := self._all.specs.get(belt), CarrierSpec):
+            found = iter([self._taken_before(carrier, change)])
         yield from (one for one in found if one is not None)
 
     def awaits(self, signal: str) -> bool:
@@ -233,11 +231,10 @@ class WorkpieceCauses:
     def _taken_before(self, spec: CarrierSpec, change: Change) -> FoundCause:
         """The last event before a change by which a workpiece was taken from where something would take one that is switched on,
         if none is there any more."""
-        belt, takes = (
-            spec.source or "",
-            [name for name in self._all.parts[spec.name].block.levels if name not in (HELD_OUT, PLACE)],
-        )
-        if not all(self._all.holding.level(PinName(spec.name, name), change.time) for name in takes):
+        belt = spec.source or ""
+        takes = [name for name in self._all.parts[spec.name].block.levels if name not in (HELD_OUT, PLACE)]
+        is_on = all(self._all.holding.level(PinName(spec.name, name), change.time) for name in takes)
+        if not is_on or not isinstance(self._all.specs.get(belt), ConveyorSpec):
             return None
         lasts = self._last_events(belt, (), change)
         return None if lasts is None or self._here(belt, lasts, change) else self._taken(belt, lasts, change, -1)
