@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.beam import BEAM, SEEN
+from steptwin.simulation.components.beltgrip import BeltGrip
 from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.components.body import BODY, SIGNALS
+from steptwin.simulation.components.carrier import Carrier
 from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.conveyortable import stop_terminal
 from steptwin.simulation.components.touch import HIT
@@ -49,6 +52,13 @@ class NotedMeetings:
         self.holders: dict[tuple[str, Nanos], str] = {}
         """The workpiece before one that comes to stand on a belt, or the terminal of the stop that holds it, by its name and
         the moment."""
+        carriers = (one for parts in world.objects.elements.values() for one in parts.items() if isinstance(one[1], Carrier))
+        self._met = {name: _Met(world, name, one.grip) for name, one in carriers if isinstance(one.grip, BeltGrip)}
+
+    def is_met(self, carrier: str, now: Nanos) -> bool:
+        """Whether a workpiece is where a cup or gripper would take it from a belt at a moment."""
+        met = self._met[carrier].changes
+        return met[bisect_right(met, now, key=lambda one: one[0]) - 1][1]
 
     def stands(self, conveyor: str, workpiece: str, now: Nanos) -> None:
         """A workpiece comes to stand on a belt."""
@@ -81,6 +91,26 @@ class NotedMeetings:
         if parts:
             self.seen[f"{collision}.{HIT.lower()}", now] = parts
             self.movers[collision, now] = movers(self._world, parts[0], parts[1], now)
+
+
+class _Met:
+    """Notes whether a workpiece is where one would be taken from a belt, at each event of that, of the belts, and of what
+    drives those. As `steptwin.simulation.scheduler.subscribers.SchedulerSubscriber`."""
+
+    def __init__(self, world: Simulation, name: str, grip: BeltGrip) -> None:
+        self._grip = grip
+        self.changes = [(world.now, grip.is_met(world.now))]
+        belts = [one for one in world.objects.described.of(CONVEYOR) if one.name in grip.depends_on]
+        drives = [world.axes[one.axis].spec.drive[0] for one in belts if one.axis is not None]
+        world.objects.scheduler_of[name].subscribe(self, (*grip.depends_on, *drives))
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        is_met = self._grip.is_met(now)
+        if is_met is not self.changes[-1][1]:
+            self.changes.append((now, is_met))
 
 
 def movers(world: Simulation, one: str, other: str, now: Nanos, along: int | None = None) -> tuple[str, ...]:

@@ -10,11 +10,14 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.brake import Brake
+from steptwin.simulation.components.carrier import HELD, PLACE, Carrier, CarrierSpec
+from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.counter import Counter
 from steptwin.simulation.components.cylinder import EXTENDED, RETRACTED, Cylinder
 from steptwin.simulation.components.relay import Relay
 from steptwin.simulation.components.timer import Timer
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
+from steptwin.simulation.mechanics.belt import NANOMETRES
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
@@ -35,6 +38,8 @@ MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
 IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
 DELAY_LASTS = Message("why.delay-lasts", "the time of {name} runs until {time:.6f} s")
 HAS_COUNTED = Message("why.has-counted", "{name} has counted {count} of {preset}")
+IS_ELSEWHERE = Message("why.is-elsewhere", "{workpiece} is at {place:.6g} mm of {belt}, and {name} takes one at {at:g} mm")
+NONE_IS_ON = Message("why.none-is-on", "no workpiece is on {belt}, and {name} takes one at {at:g} mm")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
 
 _Asked: TypeAlias = "str | tuple[str, Resource]"
@@ -147,6 +152,27 @@ class PresentStates:
                 jams = [one for one in self._causes.axes.jams(owner) if one.time <= self._at]
                 axes = self._causes.axes
                 yield from (axes.rotor_event(owner, one).link for one in jams if axes.holds_rotor(one, jams))
+            case Carrier() if terminal.upper() == HELD and not self._log.level(name, self._at):
+                yield from self._not_there(owner, part)
+
+    def _not_there(self, owner: str, carrier: Carrier) -> Iterator[ChainLink]:
+        """Where the next workpiece of a belt is that something would take which is switched on."""
+        spec, inputs = self._causes.specs[owner], [one for one in carrier.block.levels if one not in carrier.block.outputs]
+        belt = self._world.objects.built(CONVEYOR).get(getattr(spec, "source", None) or "")
+        is_on = all(carrier.block.is_on(one) for one in inputs if one != PLACE)
+        if not isinstance(spec, CarrierSpec) or belt is None or not is_on or carrier.is_occupied(self._at):
+            return
+        places = {
+            one.workpiece.name: belt.belt.to_nm(one.front(belt.belt.position(self._at))) / NANOMETRES
+            for one in belt.belt.workpieces
+        }
+        before = {name: place for name, place in places.items() if place < spec.pick_at}
+        if places:
+            next_one = max(before, key=before.__getitem__) if before else min(places, key=places.__getitem__)
+            words = IS_ELSEWHERE(workpiece=next_one, place=places[next_one], belt=belt.spec.name, name=owner, at=spec.pick_at)
+        else:
+            words = NONE_IS_ON(belt=belt.spec.name, name=owner, at=spec.pick_at)
+        yield ChainLink(self._at, belt.spec.name, words)
 
     def _resource(self, controller: str, resource: Resource) -> _Links:
         """Links and signals of the thing that a statement waits for."""

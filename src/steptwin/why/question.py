@@ -131,7 +131,11 @@ class Why:
             present, holding = (yield from self._present(at)), self.causes.holding
             owners = {one: self.world.axes.get(one.removesuffix(".power")) for one in signals}
             given = [one if owners[one] is None else self.causes.axes.power_of(one.removesuffix(".power")) for one in signals]
-            states = present.of([one for one in given if self.log.has(one) and holding.remembers(one, at, {})])
+            finds_nothing = partial(self.causes.workpieces.finds_nothing, at=at)
+            told = [
+                one for one in given if holding.remembers(one, at, {}) or any(map(finds_nothing, self.past.behind((one,), at)))
+            ]
+            states = present.of([one for one in told if self.log.has(one)])
             return self._after(present, list(states), (yield from self._answer(text, at, state, since, first)))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)

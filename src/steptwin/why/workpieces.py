@@ -218,8 +218,8 @@ class WorkpieceCauses:
         elif isinstance(contact, Sensor):
             passed = {one for key in seen if key[0] == signal for one in seen[key]}
             found = self._lacking(belt, contact.at_mm, passed, change, since)
-        elif isinstance(carrier := self._all.specs.get(belt), CarrierSpec):
-            found = iter([self._taken_before(carrier, change)])
+        elif self.finds_nothing(signal, at):
+            found = self._nothing_to_take(self._all.specs[belt], change, since)
         yield from (one for one in found if one is not None)
 
     def awaits(self, signal: str) -> bool:
@@ -228,16 +228,23 @@ class WorkpieceCauses:
             self._all.specs.get(signal.partition(".")[0]), CarrierSpec
         )
 
-    def _taken_before(self, spec: CarrierSpec, change: Change) -> FoundCause:
-        """The last event before a change by which a workpiece was taken from where something would take one that is switched on,
-        if none is there any more."""
+    def finds_nothing(self, signal: str, at: Nanos) -> bool:
+        """Whether a signal says that a carrier holds nothing which is switched on where none of the workpieces of its belt is."""
+        name, _, terminal = signal.partition(".")
+        spec = self._all.specs.get(name)
+        if not isinstance(spec, CarrierSpec) or terminal.upper() != HELD_OUT or self._log.level(signal, at):
+            return False
+        block, is_belt = self._all.parts[name].block, isinstance(self._all.specs.get(spec.source or ""), ConveyorSpec)
+        takes = [PinName(name, one) for one in block.levels if one != PLACE and one not in block.outputs]
+        return is_belt and all(self._all.holding.level(one, at) for one in takes) and not self._log.meetings.is_met(name, at)
+
+    def _nothing_to_take(self, spec: CarrierSpec, change: Change, since: Nanos) -> Iterator[FoundCause]:
+        """Reasons why no workpiece is where a carrier would take one before a change: what took the last one from its belt, or
+        why none comes."""
         belt = spec.source or ""
-        takes = [name for name in self._all.parts[spec.name].block.levels if name not in (HELD_OUT, PLACE)]
-        is_on = all(self._all.holding.level(PinName(spec.name, name), change.time) for name in takes)
-        if not is_on or not isinstance(self._all.specs.get(belt), ConveyorSpec):
-            return None
         lasts = self._last_events(belt, (), change)
-        return None if lasts is None or self._here(belt, lasts, change) else self._taken(belt, lasts, change, -1)
+        taken = None if lasts is None or self._here(belt, lasts, change) else self._taken(belt, lasts, change, -1)
+        yield from self._lacking(belt, spec.pick_at, (), change, since) if taken is None else (taken,)
 
     def _lacking(
         self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos, onto: frozenset[str] = frozenset()
