@@ -14,16 +14,18 @@ from typing import Protocol, TypeVar
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
+from steptwin.simulation.world.actions import is_release
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import SLICE_NS, LoggedSnapshot, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import AND, Causes
+from steptwin.why.controllers import acted
 from steptwin.why.lacking import Found, Lacking
-from steptwin.why.log import in_parts
+from steptwin.why.log import LAST, in_parts
 from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
-from steptwin.why.roots import Root, SetFault
+from steptwin.why.roots import Act, Root, SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.whynot import what_lacks
 from steptwin.why.without import NOT_TRIED, Trying, trying_without
@@ -104,25 +106,27 @@ class PastQuestions:
         answer = yield from self._with_held(answer)
         lacking = yield from self._settled(lambda known: what_lacks(known.past, question, at))
         answer = answer._replace(links=(*lacking, *answer.links))
-        tried: dict[str, Trial] = {}
+        tried: list[Trial] = []
         held_back: list[Trial] = []
         suspects = self._suspects(answer)
         programs = yield from self._standing(answer if suspects else answer._replace(links=()))
         for name in suspects:
             first, *others = yield from self._without_fault(name, (answer, *programs))
             if _decides(first, answer):
-                tried[name] = first
+                tried.append(first)
             else:
                 held_back += [one for one, stand in zip(others, programs, strict=True) if _decides(one, stand)][:1]
         masked = () if tried or held_back or not suspects else (yield from self._masking(suspects, answer))
-        links = _between(_with(answer.links[len(lacking) :], (*tried.values(), *held_back)), masked)
+        if not (tried or held_back or masked or any(link.root for link in answer.links)):
+            tried = yield from self._deciding_acts(answer)
+        links = _between(_with(answer.links[len(lacking) :], (*tried, *held_back)), masked)
         answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *links))))
         if not try_without:
             return answer
         trials: list[Trial] = []
         for link in answer.links:
             if link.root is not None:
-                known = tried.get(link.root.name) if isinstance(link.root, SetFault) else None
+                known = next((one for one in tried if one.link.root == link.root), None)
                 trials.append(known or (yield from self._trying(link, (answer,)))[0])
         return answer._replace(trials=tuple(trials))
 
@@ -152,6 +156,19 @@ class PastQuestions:
         for name in dict.fromkeys(names):
             found[name] = yield from self._settled(lambda known, name=name: self._answer(known, name, answer.at))
         return [*found.values()]
+
+    def _deciding_acts(self, answer: Answer) -> Generator[None, None, list[Trial]]:
+        """The runs without each of the last acts of scripts and from outside, as far as something is so because of them."""
+        there = yield from self._settled(lambda known: known.past.world_at(answer.at))
+        since = answer.known_from if answer.since is None else answer.since
+        acts = [one for one in there.acts if not is_release(one.script)]
+        near = [one for one in acts if one.time >= since or answer.at - since >= STANDS_NS]
+        found: list[Trial] = []
+        for act in near[-MOST_SUSPECTS:]:
+            link = acted(Act(*act, LAST, act.script)).link
+            (trial,) = yield from self._trying(link, (answer,))
+            found += [trial] if _decides(trial, answer) else []
+        return found
 
     def _without_fault(self, name: str, answers: Sequence[Answer]) -> Generator[None, None, Sequence[Trial]]:
         """The run without a fault, for each of some answers. The first one, of what was asked, counts also for `STANDS_NS` before

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.fields import PROGRAM, ControllerName, Meaning
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.command import command
@@ -72,6 +73,20 @@ class Refused(NamedTuple):
 
 ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave | Refused | Halt | EndScripts
 """An input from outside a world. Recorded with its moment, it can be replayed."""
+
+
+class PastAct(NamedTuple):
+    """An action at a moment. ``script``: the one that did it; empty: it came from outside."""
+
+    time: Nanos
+    script: str
+    what: ExternalInput
+
+
+MOST_ACTS = 8
+"""Number of the last actions that a world remembers."""
+NO_ACTS = (Bytes, Refused, Leave, do.Expect, do.Note, do.SetFault, do.ClearFault)
+"""Inputs that are not among them: they change nothing, or are noted elsewhere."""
 
 
 def size_of(what: ExternalInput) -> int:

@@ -7,6 +7,7 @@ schedulers are advanced.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 
@@ -22,7 +23,7 @@ from steptwin.simulation.scheduler.worldsubscriber import WorldSubscriber
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import prepare
 from steptwin.simulation.world.boundedlog import BoundedLog
-from steptwin.simulation.world.inputs import ExternalInput
+from steptwin.simulation.world.inputs import MOST_ACTS, NO_ACTS, ExternalInput, PastAct
 from steptwin.simulation.world.model import Model
 from steptwin.simulation.world.references import check_faults, check_scripts
 from steptwin.simulation.world.running import Script
@@ -57,6 +58,8 @@ class Simulation(Model):
         """Called with everything from outside as it comes."""
         self.act_subscribers: list[Callable[[str, ExternalInput], None]] = []
         """Called before each action at the present moment, with the script that does it; empty: what comes from outside."""
+        self.acts: deque[PastAct] = deque(maxlen=MOST_ACTS)
+        """The last actions of scripts and from outside, without `NO_ACTS`."""
         self.is_settled = False
         """Whether the scripts of the description have run since the last external input."""
         self._scripts = Scripts(self, self.perform, self.apply_input)
@@ -135,6 +138,8 @@ class Simulation(Model):
         for subscriber in self.act_subscribers:
             subscriber(by, what)
         action(self._scripts)
+        if not isinstance(what, NO_ACTS):
+            self.acts.append(PastAct(self.now, by, what))
 
     # ------------------------------------------------------------------ time
 
@@ -223,6 +228,7 @@ class Simulation(Model):
             tuple(self.objects.faults.controllers),
             self.objects.faults.copy_state(),
             self._scripts.state(),
+            tuple(self.acts),
             tuple(self.inputs) if with_inputs else (),
             self.is_settled,
             self.failures.state(),
@@ -249,6 +255,7 @@ class Simulation(Model):
         self.fault_setup.put_back(snapshot.faults, snapshot.prepared, snapshot.faults_state)
         for scheduler, state in zip(self.schedulers, snapshot.schedulers, strict=True):
             scheduler.restore(state)
+        self.acts = deque(snapshot.acts, MOST_ACTS)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
         self.failures, self.overdue = BoundedLog(snapshot.failures), BoundedLog(snapshot.overdue)
         self.downloaded.clear()

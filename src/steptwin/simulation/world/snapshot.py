@@ -13,7 +13,7 @@ from steptwin.simulation.faults import Fault
 from steptwin.simulation.scheduler.schedulerstate import SchedulerState
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.boundedlog import BoundedLogState
-from steptwin.simulation.world.inputs import ExternalInput
+from steptwin.simulation.world.inputs import ExternalInput, PastAct
 from steptwin.simulation.world.scripts import ScriptsState
 
 
@@ -38,6 +38,7 @@ class SimulationSnapshot:
     """The controllers that were prepared for faults."""
     faults_state: Any
     scripts: ScriptsState
+    acts: tuple[PastAct, ...]
     inputs: tuple[RecordedInput, ...]
     is_settled: bool
     failures: BoundedLogState
