@@ -37,12 +37,13 @@ Asked: TypeAlias = "tuple[str, str, float | None]"
 
 
 class Machine(NamedTuple):
-    """``outside``: what comes from outside, by its moment in s. ``questions``: each with its moment, and its answer: parts of the
-    state and of each link."""
+    """``positions``: the table of the program. ``outside``: what comes from outside, by its moment in s. ``questions``: each with
+    its moment, and its answer: parts of the state and of each link."""
 
     name: str
     tables: str
     program: str
+    positions: str
     outside: tuple[tuple[float, str], ...]
     end: float
     questions: Mapping[tuple[str, float | None], tuple[str, ...]]
@@ -63,7 +64,9 @@ def machines() -> Iterator[Machine]:
             questions[question, float(at) if at else None] = tuple(link.strip() for link in links)
         end = float(parts.get("end", "3"))
         moments = tuple((float(at), what) for at, what in outside)
-        yield Machine(name.strip(), parts.get("world", ""), parts.get("program", ""), moments, end, questions)
+        yield Machine(
+            name.strip(), parts.get("world", ""), parts.get("program", ""), parts.get("positions", ""), moments, end, questions
+        )
 
 
 MACHINES = {machine.name: machine for machine in machines()}
@@ -103,7 +106,8 @@ def past(name: str) -> ReplayedRun:
     machine = MACHINES[name]
     is_chip = machine.program.lstrip().startswith("[")
     text = machine.tables if "[world]" in machine.tables else HEAD + (CHIP if is_chip else MIC) + machine.tables
-    world = World.from_toml(text, {"p.prg": machine.program.encode(), "p.m1486": machine.program.encode()})
+    files = {"p.prg": machine.program, "p.m1486": machine.program, "p.pos": machine.positions}
+    world = World.from_toml(text, {name: content.encode() for name, content in files.items()})
     for moment, what in machine.outside:
         world.run(moment)
         world.apply_input(act(what))

@@ -34,6 +34,8 @@ class Attempts:
         refused = self._all.controllers.refused(controller, names, until, before, after)
         later = [] if ignored is None or (after >= 0 and not self._is_later(controller, number, ignored, after)) else [ignored]
         later += [] if refused is None else [refused]
+        stays = self._all.axes.not_beyond(controller, number, until, after)
+        later += [] if stays is None or stays.place.order >= before else [stays]
         found = sorted((*later, *self._kept(controller, number, until, before)), key=lambda one: one.place)
         return found[-1]._replace(along=(*found[-1].along, *found[:-1])) if found else None
 

@@ -39,6 +39,8 @@ MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which be
 HAD_NO_POWER = Message("why.had-no-power", "{axis} had no power from {begin:.6f} s on: the pulses since then moved nothing")
 HOLDS = Message("why.holds", "the motor of {axis} holds {torque:g} N·m at rest, as {key} in {where} has it")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
+STOPPED_WITH_OTHER = Message("why.stopped-with-other", "{axis} stopped with the other axis of its path at the soft limit {limit}")
+NOT_BEYOND = Message("why.not-beyond", "{axis} is at its soft limit {limit}: the command moved nothing")
 BRAKES_NS: Nanos = SECOND // 10
 """How much later than a load stands its brake may have closed (`steptwin.simulation.components.brake`)."""
 MOST_SUMMED = 20
@@ -46,6 +48,8 @@ MOST_SUMMED = 20
 POSITION = "position"
 SETTINGS = ("VMAX", "ACC", "DEC")
 """Registers of an axis by which a motion is made."""
+REST = 1
+"""The status of an axis that is enabled and has not come to a target, such as one of a path that ended before."""
 LIMITS = {9: "POSLIM_L", 10: "POSLIM_R"}
 """Registers of its soft limits, by the status at them (manual 4.1)."""
 
@@ -86,8 +90,10 @@ class AxisCauses:
         stopped = PULSES_STOPPED if self._falls(controller, record.subject, plan, profile) else STOPPED
         cover, names = None, SETTINGS
         limit = self.soft_limit(controller, record.subject, plan.time if profile.end is None else profile.end, until)
+        of_limit = limit.partition("_")[0].removeprefix("M") or record.subject
         if limit:
-            text, names = STOPPED_AT_SOFT_LIMIT(axis=shown, limit=limit), (limit.partition("_")[2],)
+            is_own, names = of_limit == record.subject, (limit.partition("_")[2],)
+            text = (STOPPED_AT_SOFT_LIMIT if is_own else STOPPED_WITH_OTHER)(axis=shown, limit=limit)
             place = max(place, Place(plan.time if profile.end is None else profile.end))
         elif not profile.segments:
             text, names = stopped(axis=shown), ()
@@ -107,7 +113,7 @@ class AxisCauses:
         def besides() -> Iterator[Cause]:
             if (mechanics or since is not None) and self._shortened(controller, plan) is None:
                 yield from self._begun_from(controller, plan, since or 0)
-            yield from self.settings(controller, record.subject, place.time, names)
+            yield from self.settings(controller, of_limit, place.time, names)
             for one in self._all.controllers.acts_by(controller, plan, record.subject):
                 found = self._acted_by(controller, record.subject, one, plan)
                 if found is not None:
@@ -238,16 +244,42 @@ class AxisCauses:
             yield from self._all.controllers.made_by(controller, plan)
 
     def soft_limit(self, controller: str, axis: str, end: Nanos, until: Nanos) -> str:
-        """The register of the soft limit at which a motion has ended; empty for another one."""
+        """The register of the soft limit at which a motion has ended, its own or that of the other axis of its path; empty for
+        another one."""
         there = self._all.of(end) if end <= until else None
         if there is not self._all:
             return "" if there is None else there.axes.soft_limit(controller, axis, end, until)
-        event = self._log.last_axis_event(controller, axis, end)
+        others = self._log.plans_in_force(controller, "", end) if self._status(controller, axis, end) == REST else ()
+        together = [self._log.record(one).subject for one in others if self._end(one)[0] == end]
+        every = (axis, *(together if axis in together else ()))
+        return next((f"M{one}_{name}" for one in every if (name := self._limit(controller, one, end)) is not None), "")
+
+    def _limit(self, controller: str, axis: str, since: Nanos) -> str | None:
+        """The soft limit at which an axis has been since a moment, by its status; None where that is of a limit switch."""
+        event = self._log.last_axis_event(controller, axis, since)
+        is_told = event is not None and event.time == since
+        return None if is_told else LIMITS.get(self._status(controller, axis, since))
+
+    def _status(self, controller: str, axis: str, at: Nanos) -> int:
+        """The status of an axis at a moment; 0 where its controller has none."""
         series = self._log.points.series(f"{controller}.M{axis}_STATUS")
-        if series is None or (event is not None and event.time == end):
-            return ""
-        name = LIMITS.get(int(points.level(series, end)))
-        return "" if name is None else f"M{axis}_{name}"
+        return 0 if series is None else int(points.level(series, at))
+
+    def not_beyond(self, controller: str, axis: str, until: Nanos, after: Nanos = -1) -> FoundCause:
+        """The last command between two moments that a soft limit did not let begin, if the status of its axis says so since."""
+        status, is_at_limit = f"M{axis}_STATUS", self._status(controller, axis, until) in LIMITS
+        since = self._log.since(f"{controller}.{status}", until) if is_at_limit else None
+        there = None if since is None or since <= after else self._all.of(since)
+        name = None if since is None or there is None else there.axes._limit(controller, axis, since)
+        if since is None or there is None or name is None or there.axes.ended(controller, axis, since):
+            return None
+        by = there.controllers.commanded_at(controller, since, Resource(ResourceKind.AXIS, axis), status)
+        if by is None:
+            return None
+        text = NOT_BEYOND(axis=f"{controller}.M{axis}", limit=f"M{axis}_{name}")
+        set_by = partial(there.axes.settings, controller, axis, since, (name,))
+        place = by.place._replace(number=by.place.number + 1)
+        return Cause(ChainLink(place.time, controller, text), place, lambda: by, Cover.LEVEL, set_by)
 
     def moved(
         self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True, since: Nanos | None = None

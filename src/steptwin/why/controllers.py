@@ -64,16 +64,29 @@ class ControllerCauses:
 
     def at_moment(self, controller: str, time: Nanos, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
-        group, order = self._log.group(controller), self._log.points.order_of(f"{controller}.{point}", time)
-        change = Change(time, 0.0, group, self._log.position(group, time), LAST if order is None else order)
+        change = self._moment(controller, time, point)
         if wanted is not None and wanted.kind is ResourceKind.ENCODER:
             return self.commanded(controller, change, wanted, point) or self._all.axes.counted(controller, wanted.name, time)
+        if wanted is not None and point.upper().replace(".", "_") == f"M{wanted.name}_STATUS":
+            stays = self._all.axes.not_beyond(controller, wanted.name, time, time - 1)
+            if stays is not None:
+                return stays
         found = self.in_controller(controller, change, wanted, point)
         if wanted is not None and wanted.kind is ResourceKind.AXIS:
             found = self._all.axes.followed(controller, wanted.name, time, LAST, found)
         if found is None and wanted is not None:
             return self._all.axes.motion(controller, wanted.name, time)
         return found
+
+    def _moment(self, controller: str, time: Nanos, point: str) -> Change:
+        """A change of a point of a controller that no record shows."""
+        group, order = self._log.group(controller), self._log.points.order_of(f"{controller}.{point}", time)
+        return Change(time, 0.0, group, self._log.position(group, time), LAST if order is None else order)
+
+    def commanded_at(self, controller: str, time: Nanos, wanted: Resource, point: str) -> FoundCause:
+        """The command at the moment of a change of a point, or the request before it that is answered then."""
+        change = self._moment(controller, time, point)
+        return self.commanded(controller, change, wanted) or self._asked_before(controller, change)
 
     def in_controller(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
