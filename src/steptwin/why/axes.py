@@ -23,7 +23,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing, unknown
-from steptwin.why.controllers import HOMED, acted
+from steptwin.why.controllers import HOMED
 from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
@@ -612,7 +612,7 @@ class AxisCauses:
             for act in self._log.acts_before(until, before)
             if isinstance(act.what, do.Turn) and (act.what.controller, str(act.what.axis)) == (controller, number)
         )
-        found = [covered(acted(act), Cover.LEVEL) for act in turned][:1]
+        found = [covered(self._all.scripts.acted(act), Cover.LEVEL) for act in turned][:1]
         if not found:
             self._log.lack()
         axis = self.driven(controller, number)

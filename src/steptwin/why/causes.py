@@ -21,7 +21,8 @@ from steptwin.why.answer import ChainLink, Cover, since_before
 from steptwin.why.attempts import Attempts
 from steptwin.why.axes import AxisCauses
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.controllers import ControllerCauses, acted
+from steptwin.why.changes import SignalChanges
+from steptwin.why.controllers import ControllerCauses
 from steptwin.why.elements import ElementCauses, inputs
 from steptwin.why.holding import FAULT, HoldingCauses
 from steptwin.why.interrupts import InterruptCauses
@@ -29,6 +30,7 @@ from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
 from steptwin.why.roots import SetFault
+from steptwin.why.scripts import ScriptCauses, acted
 from steptwin.why.workpieces import IS_WIRED_TO, WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
@@ -72,7 +74,7 @@ class Causes:
         self.axes, self.attempts = AxisCauses(self), Attempts(self)
         self.programs, self.interrupts = ProgramCauses(self), InterruptCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
-        self.workpieces = WorkpieceCauses(self)
+        self.workpieces, self.scripts, self.changes = WorkpieceCauses(self), ScriptCauses(self), SignalChanges(self)
         self.holding = HoldingCauses(self)
 
     def of(self, moment: Nanos) -> Causes | None:
@@ -231,7 +233,7 @@ class Causes:
         held = None if hold is None else hold.held
         acts = self.log.acts_at(change.time, change.order) if held is not None else ()
         act = next((act for act in acts if held is not None and act.what == do.ClearFault(held.fault)), None)
-        return None if act is None else acted(act)
+        return None if act is None else self.scripts.acted(act)
 
     def _older_fault(self, signal: str, at: Nanos) -> Iterator[Cause]:
         """The fault that holds a signal again since a newer one ended at a moment."""
@@ -318,7 +320,7 @@ class Causes:
             return self.change(channel, latest, of(pin=str(pin)))
         act = next((act for act in self.log.acts_at(change.time, change.order) if sets(act, pin)), None)
         if act is not None:
-            return acted(act)
+            return self.scripts.acted(act)
         path = self._world.objects.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
@@ -336,7 +338,7 @@ class Causes:
                 case do.Press(button) | do.Release(button) if button == name:
                     if is_release(act.by):  # who pressed it was before the log
                         self.log.lack()
-                    return acted(act)
+                    return self.scripts.acted(act)
         first = change
         while (earlier := self.log.last_change(name, first.time - 1)) is not None and first.time - earlier.time < SECOND:
             first = earlier

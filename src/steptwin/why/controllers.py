@@ -24,12 +24,11 @@ from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.log import BEGINS, LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.roots import Act, Sent
-from steptwin.why.sentences import SETS_A_FAULT, describe_input
+from steptwin.why.scripts import FROM_OUTSIDE
+from steptwin.why.sentences import describe_input
 from steptwin.wire.crc import with_crc
 
 CLIENT = Message("why.client", "client {client}: {meaning}")
-SCRIPT = Message("why.script", "script {name}: {what}")
-FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
 STOPPED_WHERE = Message("why.stopped-where", "{event}: {level}")
 NOT_ENABLED = "drive-off"
 """Event of an axis that ignored a command because it is not enabled."""
@@ -169,7 +168,7 @@ class ControllerCauses:
         if index is not None:
             return self._all.programs.statement(controller, index)
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
-        return None if act is None else acted(act)
+        return None if act is None else self._all.scripts.acted(act)
 
     def acts_by(self, controller: str, plan: Change, axis: str) -> Sequence[Resource]:
         """The things by which the command of a plan of an axis acts, besides its value."""
@@ -210,7 +209,7 @@ class ControllerCauses:
         if on is None:
             acts = (act for act in self._log.acts_before(until, before) if _changes(act, controller) and _names(act, name))
             act = next(acts, None)
-            return None if act is None else covered(acted(act), Cover.LEVEL)
+            return None if act is None else covered(self._all.scripts.acted(act), Cover.LEVEL)
         last = self._log.position(group, until)
         for position in range(last - 1, max(-1, last - MOST_LOOKED_BACK), -1):
             record, order = self._log.records[group][position], self._log.order(group, position)
@@ -253,7 +252,7 @@ class ControllerCauses:
             if on is not None and isinstance(what, Bytes) and what.line == on[0].name and _is_spoilt(what, on[1]):
                 text = WRONG_CHECKSUM(request=CLIENT(client=what.place, meaning=self.sends(what, act.time)))
                 link = ChainLink(act.time, what.line, text)
-                found.append(Cause(link, Place(act.time, act.order, 1), partial(acted, act)))
+                found.append(Cause(link, Place(act.time, act.order, 1), partial(self._all.scripts.acted, act)))
         found.sort(key=lambda one: one.place, reverse=True)
         return (one for one in found if after < one.place.time <= until and one.place.order < before)
 
@@ -315,7 +314,7 @@ class ControllerCauses:
             return self.of_program(controller, StateChange(event.time, ProgramState.RUNS, event.order))
         supply = self._world.objects.supplied.get(controller)
         act = next((act for act in self._log.acts_at(event.time, event.order) if _changes(act, controller)), None)
-        found = acted(act) if act is not None else self._no_supply(controller, event)
+        found = self._all.scripts.acted(act) if act is not None else self._no_supply(controller, event)
         if found is None and supply is not None:
             found = self._all.elements.at_element(supply, event)
         is_first = event is self._log.begins[controller][0] and self._log.reaches_begin()
@@ -421,7 +420,7 @@ class ControllerCauses:
         """The last action by a moment that set a variable of a program."""
         for act in self._log.acts_before(until, LAST):
             if isinstance(act.what, SetVariable) and (act.what.controller, act.what.name) == (controller, name):
-                return acted(act)
+                return self._all.scripts.acted(act)
         return None
 
     def _statement_at(self, controller: str, change: Change, wanted: Resource | None) -> int | None:
@@ -578,12 +577,12 @@ class ControllerCauses:
         act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
         if act is None:
             self._log.lack()
-        return None if act is None else covered(acted(act), Cover.FRAME)
+        return None if act is None else covered(self._all.scripts.acted(act), Cover.FRAME)
 
     def _input(self, record: TraceRecord, order: int) -> Cause:
         act = next(self._log.acts_at(record.time, order), None)
         if act is not None:
-            return acted(act)
+            return self._all.scripts.acted(act)
         link = ChainLink(record.time, record.controller, FROM_OUTSIDE(what=f"{record.subject} {record.value}"))
         return Cause(link, Place(record.time, order), nothing)
 
@@ -639,9 +638,3 @@ def _changes(act: Act, controller: str) -> bool:
         case do.Write(values):
             return any(name == controller for name, *_ in values)
     return False
-
-
-def acted(act: Act) -> Cause:
-    what = describe_input(act.what) if not act.fault else SETS_A_FAULT(name=act.fault)
-    text = SCRIPT(name=act.by, what=what) if act.by else FROM_OUTSIDE(what=what)
-    return Cause(ChainLink(act.time, act.by or "outside", text, act), Place(act.time, act.order), nothing)

@@ -19,9 +19,9 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, Place, covered, nothing
-from steptwin.why.controllers import acted
 from steptwin.why.lacking import HAPPENED
 from steptwin.why.log import LAST
+from steptwin.why.scripts import acted
 
 ALTHOUGH = Message("why.although", "{signal} is {value:g} although {other}")
 FAULT = Message("why.fault", "fault {name}: {what}")

@@ -99,6 +99,14 @@ class Change(NamedTuple):
     order: int
 
 
+class EndedWait(NamedTuple):
+    """A condition has come for which a script waited. ``order``: as that of a `Change`."""
+
+    time: Nanos
+    order: int
+    condition: str
+
+
 class Hold(NamedTuple):
     """From a moment on a fault holds a signal; nothing does, if ``held`` is None."""
 
@@ -156,6 +164,8 @@ class CauseLog:
         """Events of workpieces: all, and by the workpiece and by the element."""
         self.meetings = NotedMeetings(world)
         self.acts: list[Act] = []
+        self._waits: dict[str, list[EndedWait]] = defaultdict(list)
+        """Conditions that have come, by the script that waited for them."""
         self._fault_acts: dict[str, list[Act]] = defaultdict(list)
         """Those that set or clear a fault, by its name."""
         self._fault_times: dict[str, list[Nanos]] = defaultdict(list)
@@ -180,6 +190,7 @@ class CauseLog:
         self.actions, self.states = NotedActions(world), ProgramStates(world, self._order_of)
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
+        world.until_subscribers.append(self._went_on)
         parts.faults.act_subscribers.append(self._fault_acted)
         self._note_statements()
 
@@ -343,6 +354,11 @@ class CauseLog:
                 for holds in self._holds.values():
                     if (held := holds[-1].held) is not None and held.fault == name:
                         holds.append(Hold(self.world.now, None, self._order))
+
+    def _went_on(self, script: str, condition: str) -> None:
+        self.world.sync_all()
+        self._count()
+        self._waits[script].append(EndedWait(self.world.now, self._order, condition))
 
     def _led_by(self, script: str, what: ExternalInput) -> str:
         """The script that led to an action of another one: the one that pressed a button for some time."""
@@ -560,6 +576,10 @@ class CauseLog:
         """Acts of scripts and from outside by a moment, before an order, the last ones first."""
         last = bisect_left(self.acts, (until, before), key=lambda act: (act.time, act.order)) - 1
         return (self.acts[index] for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1))
+
+    def waits_before(self, script: str, until: Nanos, before: int) -> Iterator[EndedWait]:
+        """The waits of a script that ended by a moment, before an order, the last one first."""
+        return (one for one in reversed(self._waits.get(script, ())) if (one.time, one.order) < (until, before))
 
     def setting(self, name: str, until: Nanos) -> Act | None:
         """The last act by a moment that set a fault; None if its description does."""

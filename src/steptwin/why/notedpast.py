@@ -9,14 +9,13 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
-from steptwin.why.answer import Cover
 from steptwin.why.axes import POSITION
 from steptwin.why.causes import Causes
-from steptwin.why.chain import Cause, covered
+from steptwin.why.chain import Cause
 from steptwin.why.controllers import axis_of
 from steptwin.why.lacking import Lacking
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
-from steptwin.why.names import SLIPS, QuestionNames
+from steptwin.why.names import QuestionNames
 from steptwin.why.states import StatesOnTheWay
 
 WHY_NOT = "not "
@@ -118,50 +117,6 @@ class NotedPast:
             return None
         after = -1 if motion is None else motion.place.time
         return self.causes.attempts.last(controller, wanted.name, at, after=after)
-
-    def changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
-        """Cause of a change of one of these signals at a moment."""
-        causes = self.causes.of(time)
-        if causes is None:
-            return None
-        log = causes.log
-        last = causes.last([name for name in signals if (change := log.last_change(name, time)) and change.time == time], time)
-        if last is not None:
-            return last
-        found = [cause for name in signals if (cause := self.unrecorded(name, time))]
-        return max(found, key=lambda cause: cause.link.time, default=None)
-
-    def unrecorded(self, signal: str, time: Nanos, since: Nanos | None = None) -> Cause | None:
-        """Cause of what is in no trace at a moment; ``since``: since when it stands."""
-        owner, _, rest = signal.partition(".")
-        world, causes = self.log.world, self.causes.of(time)
-        if causes is None:
-            return None
-        if owner in world.axes and rest in SLIPS:
-            return causes.axes.slipped(owner, time, SLIPS[rest])
-        if owner in world.axes and rest != "power":
-            return causes.axes.moved(owner, time, since=since)
-        if owner in world.axes:
-            drive, switched = world.axes[owner].spec.drive, causes.axes.power(owner, time)
-            wanted = Resource(ResourceKind.AXIS, drive[1].removeprefix("M"))
-            is_switched = switched is not None and switched.link.time == time
-            return switched if is_switched else causes.controllers.at_moment(drive[0], time, wanted)
-        if owner not in world.controllers:
-            return causes.elements.of_element(owner, rest, time)
-        shown = self.names.pin(signal)
-        if shown != signal:
-            pin = Resource(ResourceKind.PIN, shown.partition(".")[2])
-            return covered(causes.programs.resource(owner, pin, 0, time) or causes.programs.first(owner, pin), Cover.LEVEL)
-        wanted = axis_of(rest)
-        if wanted is None and self.names.is_signal(signal) and world.signal(signal).continuous:
-            wanted = Resource(ResourceKind.AXIS, "")
-        if wanted is not None and wanted.kind is ResourceKind.AXIS and self.names.is_coordinate(signal):
-            return causes.axes.coordinate(owner, wanted.name or "1", time)
-        found = causes.controllers.at_moment(owner, time, wanted, rest)
-        if found is None or wanted is None or "vel" not in rest.lower():
-            return found
-        besides, until = found.besides, found.place.time
-        return found._replace(besides=lambda: (*besides(), *causes.axes.settings(owner, wanted.name, until)))
 
 
 def text_of_question(question: str) -> str:

@@ -20,12 +20,12 @@ from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import SLICE_NS, LoggedSnapshot, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import AND, Causes
-from steptwin.why.controllers import acted
 from steptwin.why.lacking import Found, Lacking
 from steptwin.why.log import LAST, in_parts
 from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import Act, Root, SetFault
+from steptwin.why.scripts import acted
 from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.whynot import what_lacks
 from steptwin.why.without import NOT_TRIED, Trying, trying_without

@@ -116,7 +116,7 @@ class Why:
             value, since = yield from self.values.from_run(asked, canonical, at, is_bare=is_bare)
         since = self.log.before(asked).since if since is None else since
         state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
-        changed = None if since is None else self.past.changed((*canonical.values(),), since)
+        changed = None if since is None else self.causes.changes.of((*canonical.values(),), since)
         shown = [pin for full in canonical.values() if (pin := self.names.pin(full)) != full]
         canonical = {name: self.names.pin(full) for name, full in canonical.items()}
         signals = tuple(canonical.values())
@@ -355,16 +355,17 @@ class Why:
             _, since = yield from self.values.from_run(is_value, {signal: full}, at, is_bare=False)
             since = self.log.before(is_value).since if since is None else since
             if self.names.is_of_rotor(full):
-                changed = None if since is None else covered(self.past.unrecorded(full, since), Cover.LEVEL)
+                changed = None if since is None else covered(self.causes.changes.unrecorded(full, since), Cover.LEVEL)
             elif self.names.point(signal) is None or self.names.is_coordinate(full):
                 # What left it where it is may have come a moment after it was there.
                 is_moved = full.partition(".")[0] in self.causes.parts and since is not None
                 moment = since if is_moved and since is not None else at
-                changed = covered(self.past.unrecorded(full, moment, since), Cover.LEVEL) or self.resting.ignored((full,), at)
+                changed = covered(self.causes.changes.unrecorded(full, moment, since), Cover.LEVEL)
+                changed = changed or self.resting.ignored((full,), at)
             else:
                 is_turned = (axis_of(full.partition(".")[2]) or (None,))[0] is ResourceKind.ENCODER
-                changed = self.resting.ignored((full,), at) if since is None else self.past.changed((full,), since)
-                changed = self.past.unrecorded(full, at) if changed is None and is_turned else changed
+                changed = self.resting.ignored((full,), at) if since is None else self.causes.changes.of((full,), since)
+                changed = self.causes.changes.unrecorded(full, at) if changed is None and is_turned else changed
             queued = yield from self._queued((full,), at)
             meanwhile = (*self._again((full,), since, at), *self.causes.holding.of((full,), at, since))
             changed = along(self._commanded(changed, queued), [*queued, *meanwhile])
@@ -373,7 +374,7 @@ class Why:
         if isinstance(standing, SignalOf) and is_constant(standing, at):
             _, since = yield from self.values.from_run(is_value, {signal: full}, at, is_bare=False)
             since = self.log.before(is_value).since if since is None else since
-        first = self.past.unrecorded(full, at)
+        first = self.causes.changes.unrecorded(full, at)
         return (yield from self._answer(signal, at, state, since, first))
 
     def _wait(self, controller: str, at: Nanos) -> Asking:

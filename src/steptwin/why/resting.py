@@ -67,7 +67,7 @@ class RestingCauses:
         if name.partition(".")[0] in self._world.axes:
             return self.ignored((name,), at)
         ignored = self.ignored((name,), at)
-        return ignored if ignored is not None else covered(self._past.unrecorded(name, at), Cover.LEVEL)
+        return ignored if ignored is not None else covered(self._past.causes.changes.unrecorded(name, at), Cover.LEVEL)
 
     def held(self, signals: Iterable[str], at: Nanos) -> Cause | None:
         """Cause for which a program does not change signals, or those that drive them: it is held, or has decided against it."""

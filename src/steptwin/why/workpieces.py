@@ -19,7 +19,6 @@ from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
-from steptwin.why.controllers import acted
 from steptwin.why.log import LAST, Change, words_of
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED, STANDS
 from steptwin.why.roots import Act
@@ -59,7 +58,7 @@ class WorkpieceCauses:
             return self.event(event)
         for act in self._log.acts_at(change.time, change.order):
             if isinstance(act.what, do.Remove) and is_there(act.what.workpiece, change):
-                return acted(act)
+                return self._all.scripts.acted(act)
         return None
 
     def _places(self, workpiece: str, event: Change) -> Iterator[str]:
@@ -95,7 +94,7 @@ class WorkpieceCauses:
         text = words_of(record)
         act = next((act for act in self._log.acts_at(event.time, event.order) if _moves(act, record)), None)
         if act is not None:
-            before = partial(acted, act)
+            before = partial(self._all.scripts.acted, act)
         elif self._is_fed(event, record):
             before = nothing
         else:
@@ -296,7 +295,7 @@ class WorkpieceCauses:
         gone = [one for one in gone if belt in self._places(self._workpiece(one), one)]
         acts = [act for one in lasts if (act := self._removed(one, change)) is not None and act.time > since]
         if acts:
-            return covered(acted(max(acts, key=lambda act: (act.time, act.order))), Cover.LEVEL)
+            return covered(self._all.scripts.acted(max(acts, key=lambda act: (act.time, act.order))), Cover.LEVEL)
         return covered(self.event(max(gone, key=lambda one: (one.time, one.order))), Cover.LEVEL) if gone else None
 
     def _workpiece(self, event: Change) -> str:

@@ -5,7 +5,7 @@ Steps, checks and texts of programs need no more of a world. `steptwin.simulatio
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
@@ -74,6 +74,8 @@ class Model:
         self.overdue = BoundedLog()
         """Things for which scripts waited in vain: conditions and answers until their time-out, writes that were
         refused."""
+        self.until_subscribers: list[Callable[[str, str], None]] = []
+        """Called when a condition has come for which a script waited, with the name of the script and the condition."""
         self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
         others."""

@@ -254,6 +254,9 @@ class Scripts:
             value = self._answer(waiting) if has_come else None
         if has_come or (waiting.until is not None and waiting.until <= now):
             self._report_overdue(script, waiting, has_come=has_come)
+            if waiting.condition is not None and has_come:
+                for subscriber in self._model.until_subscribers:
+                    subscriber(script.name, waiting.condition)
             self._resume(script, value)
         else:
             self._dependencies.again(script)
