@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
@@ -14,7 +15,21 @@ from steptwin.why.chain import Cause, Place, covered, given
 from steptwin.why.sentences import statement_at
 
 OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
+WHILE_OFF = Message("why.while-off", "{edge}, while {label} was off")
 OF_AWAITED_INTERRUPT = Message("why.of-awaited-interrupt", "{statement} is executed by {label}, which has not come")
+
+
+MOST_EDGES = 6
+"""Limit of the changes of an input that are searched for one that an interrupt did not notice."""
+
+
+class Missed(NamedTuple):
+    """A change of an input that an interrupt, by its use and label, may have missed."""
+
+    use: StatementUse
+    label: StatementLocation
+    signal: str
+    edge: Cause
 
 
 class InterruptCauses:
@@ -63,9 +78,8 @@ class InterruptCauses:
         text, number = self._log.executed[controller].locations[last]
         handler = next((one for where, one in handlers if where == text and number in one), range(0))
         uses = [self._world.programs[controller].use(StatementLocation(text, one)) for one in handler]
-        changing, made = [one for one in uses if wanted in one.writes], {one for use in uses for one in use.writes}
-        if not handler or (len(changing) < 2 and made.isdisjoint(changing[0].reads)):
-            return  # it would change nothing
+        if not handler or not _changes_again(uses, wanted):
+            return
         label, since = StatementLocation(text, handler.start), self._log.executed[controller].times[last]
         words = OF_INTERRUPT(statement=statement_at(self._world.programs[controller], StatementLocation(text, number)))
         for switch in uses[0].acts_by:
@@ -75,6 +89,45 @@ class InterruptCauses:
                 place = written.place._replace(number=written.place.number + 1)
                 by = partial(given, covered(written, Cover.LEVEL))
                 yield switch.name, Cause(ChainLink(moment, controller, words), place, by, Cover.LEVEL)
+
+    def missed(self, controller: str, wanted: Resource, at: Nanos) -> Iterator[Missed]:
+        """The changes by a moment of inputs by which interrupts come that would have changed something since it was changed last,
+        the last ones first."""
+        programs, index = self._all.programs, self._log.last_executed(controller, at) + 1
+        for use, label, _ in self.changing(controller, wanted) if programs.stands(controller, at) is None else ():
+            written = programs.written(controller, wanted, index)
+            floor = Place(-1) if written is None else written.place
+            last = None if written is None else programs.last_of(controller, programs.writing(controller, wanted), index)
+            handler = next(one for one in self.handlers(controller, label.text) if label.number in one)
+            uses = [self._world.programs[controller].use(StatementLocation(label.text, one)) for one in handler]
+            is_own = last is not None and self._log.executed[controller].locations[last] in [
+                StatementLocation(label.text, one) for one in handler
+            ]
+            if is_own and not _changes_again(uses, wanted):
+                continue
+            for pin in (one for one in use.reads if one.kind is ResourceKind.PIN and one.name):
+                edge = programs.resource(controller, pin, index, at)
+                for _ in range(MOST_EDGES):
+                    if edge is None or edge.place <= floor:
+                        break
+                    if edge.place.time < self._log.begin:
+                        self._log.lack()
+                        break
+                    yield Missed(use, label, f"{controller}.{pin.name}", edge)
+                    edge = programs.resource(controller, pin, index, edge.place.time, edge.place.order)
+
+    def unnoticed(self, controller: str, missed: Missed) -> Cause:
+        """A change of an input while its interrupt was off, with what had switched that off."""
+        edge = missed.edge
+        words = WHILE_OFF(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
+        off = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
+        return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *off))
+
+    def switched_by(self, controller: str, use: StatementUse, at: Nanos) -> Sequence[Cause]:
+        """The last causes by a moment for which an interrupt is on or off."""
+        index = self._log.last_executed(controller, at) + 1
+        found = [self._all.programs.resource(controller, one, index, at) for one in use.acts_by]
+        return [one._replace(cover=Cover.LEVEL) for one in found if one is not None]
 
     def _comes_again(self, controller: str, label: StatementLocation, index: int, since: Nanos, until: Nanos) -> bool:
         """Whether the event of an interrupt that had come before a statement comes again between two moments."""
@@ -137,3 +190,9 @@ class InterruptCauses:
             found = [programs.use(StatementLocation(text, number)) for number in programs.labels(text).values()]
             self._handlers[key] = [range(use.governs.start - 1, use.governs.stop) for use in found if use.waits and use.governs]
         return self._handlers[key]
+
+
+def _changes_again(handler: Sequence[StatementUse], wanted: Resource) -> bool:
+    """Whether an interrupt that has changed something changes it when it comes again."""
+    changing, made = [one for one in handler if wanted in one.writes], {one for use in handler for one in use.writes}
+    return len(changing) > 1 or any(not made.isdisjoint(one.reads) for one in changing)

@@ -10,7 +10,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.later import finish
 from steptwin.messages import Message, MessageText
-from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.simulation import Simulation
@@ -20,6 +20,7 @@ from steptwin.why.attempts import NOTHING_HAS_COMMANDED
 from steptwin.why.causes import Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered
 from steptwin.why.controllers import axis_of
+from steptwin.why.interrupts import Missed
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast, text_of_question, without_not
 from steptwin.why.presentstates import IS_IN_A_LOOP, PresentStates
@@ -152,7 +153,7 @@ class Why:
         awaited = list(self.resting.awaited(signals, at)) if resting is None else []
         came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
         unseen = list(self._unseen((*shown, *waited[len(signals) :]), at, -1))
-        off = yield from self._switched_off(awaited, at)
+        off = yield from self._switched_off(dict.fromkeys((*awaited, *self.past.changeable(signals, at))), at)
         queued = yield from self._queued(signals, at)
         resting = self._commanded(resting, queued)
         resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *off, *queued, *again, *unseen])
@@ -182,12 +183,48 @@ class Why:
                 yield from filter(None, [self.causes.programs.written(controller, of_all, index)])
 
     def _switched_off(self, changeable: Iterable[tuple[str, Resource]], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
-        """The switches that are off of the interrupts that would have changed something again."""
-        every = [(owner, *found) for owner, one in changeable for found in self.causes.interrupts.switched(owner, one, at)]
-        if not every:
+        """The switches that are off of the interrupts that would have changed something again, and what they did not notice."""
+        wanted = list(changeable)
+        every = [(owner, *found) for owner, one in wanted for found in self.causes.interrupts.switched(owner, one, at)]
+        missed = [(owner, found) for owner, one in wanted for found in self.causes.interrupts.missed(owner, one, at)]
+        if not every and not missed:
             return ()
         other = yield from self.past.world_at(at)
-        return [cause for owner, switch, cause in every if not other.programs[owner].read(switch, at)]
+        off = [cause for owner, switch, cause in every if not other.programs[owner].read(switch, at)]
+        return [*off, *(yield from self._unnoticed(missed, other))]
+
+    def _unnoticed(self, missed: Sequence[tuple[str, Missed]], other: Simulation) -> Generator[None, None, Sequence[Cause]]:
+        """The last change that each interrupt did not notice as it was off, and what has switched that on since. ``other``: a
+        world in the state of the moment."""
+        found: dict[tuple[str, StatementLocation], Sequence[Cause]] = {}
+        levels: dict[tuple[str, StatementLocation], float | None] = {}
+        at = other.now
+        for owner, one in missed:
+            key, time = (owner, one.label), one.edge.place.time
+            switched = self.causes.interrupts.switched_by(owner, one.use, at)
+            if key not in levels:
+                levels[key] = yield from self._noticed(owner, one.use, switched, other)
+            if key in found or levels[key] not in (None, self.log.level(one.signal, time)):
+                continue
+            came = min(at, time + self.causes.programs.filtering(owner, one.signal.partition(".")[2]))
+            then = yield from self.past.world_at(came)
+            if not _is_on(then, owner, one.use):
+                later = [cause for cause in switched if cause.place.time > came] if _is_on(other, owner, one.use) else []
+                found[key] = (self.causes.interrupts.unnoticed(owner, one), *later)
+        return [cause for causes in found.values() for cause in causes]
+
+    def _noticed(
+        self, controller: str, use: StatementUse, switched: Sequence[Cause], other: Simulation
+    ) -> Generator[None, None, float | None]:
+        """The level that an input has to take so that an interrupt comes, by its switch now or before that was written last: 1
+        where that was off, too; None where it may be either."""
+        levels = dict(use.edges)
+        for time in (other.now, *(cause.place.time - 1 for cause in switched if cause.place.time)) if levels else ():
+            world = other if time == other.now else (yield from self.past.world_at(time))
+            value = next((world.programs[controller].read(one.name, time) for one in use.acts_by), None)
+            if value in levels:
+                return levels[value]
+        return 1.0 if levels else None
 
     def _queued(self, signals: Sequence[str], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
         """Commands that would have changed something otherwise than it was changed last, and wait behind others, or that its
@@ -439,7 +476,9 @@ class Why:
         waiting = waiting._replace(cover=Cover.WAIT, besides=lambda: others)
         first = covered(last, Cover.LEVEL) or resting or waiting
         standing = (yield from self.resting.standing(pins, at)) if last is None and resting is None else None
-        lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
+        off = yield from self._switched_off([(controller, one) for one in use.reads], at)
+        lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *off)
+        lasting = (*lasting, *self._unseen(pins, at, here.time))
         first = along(first, [waiting, *lasting, unheard])
         return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
 
@@ -497,3 +536,8 @@ class Why:
         return Answer(
             question, at, state, since, tuple(chain.links), is_complete, self.log.begin, chain.is_cut, broken=chain.broken
         )
+
+
+def _is_on(world: Simulation, controller: str, use: StatementUse) -> bool:
+    """Whether a switch of an interrupt is on in a world."""
+    return any(world.programs[controller].read(one.name, world.now) for one in use.acts_by)
