@@ -11,8 +11,10 @@ from compositions import composed, finish
 
 from steptwin.errors import Misuse
 from steptwin.messages import MessageText
+from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, ChainRule, Cover
 from steptwin.why.chain import BETWEEN, NOT_KNOWN, Cause, Chain, Place, broken, nothing
+from steptwin.why.roots import Act
 
 
 def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) -> Cause:
@@ -85,6 +87,15 @@ def test_what_led_to_something_is_taken_before_what_had_to_be_so_besides() -> No
     beside = cause(1, is_root=True)
     assert [link.time for link in long_chain(led_by((6, 7, 9), beside), 3).links] == [9, 7, 6]
     assert [link.time for link in long_chain(led_by(range(100, 108), beside), 8).links][-1] == 1
+
+
+def test_the_nearest_roots_of_what_had_to_be_so_besides_are_shown_behind_what_is_shown() -> None:
+    act = Act(1, "setup", do.Press("go"), 1, "setup")
+    deep = cause(1, is_root=True)
+    deep = deep._replace(link=replace(deep.link, root=act))
+    beside = cause(50)._replace(before=lambda: deep)
+    found = long_chain(led_by(range(100, 108), beside), 6)
+    assert [link.time for link in found.links] == [107, 106, 105, 104, 103, 102, 101, 100, 1]
 
 
 def test_the_beginning_of_a_long_chain_is_shown() -> None:

@@ -92,8 +92,8 @@ class _Waiting(NamedTuple):
 
 class Chain:
     """The causes of what is so at a place: the nearest ones are taken first, at most ``most``; of a longer chain also those at
-    its beginning, if that is near enough. ``is_whole``: whether nothing was before what is known of a moment. One that breaks a
-    rule is left out, and a link says so in its place."""
+    its beginning, if that is near enough, and the nearest roots of what had to be so besides. ``is_whole``: whether nothing was
+    before what is known of a moment. One that breaks a rule is left out, and a link says so in its place."""
 
     def __init__(
         self,
@@ -111,6 +111,8 @@ class Chain:
         self._taken: dict[tuple[Place, ChainLink], None] = {}
         self._followed: list[tuple[Place, ChainLink]] = []
         """Those that are farther than what is shown, on the way to the beginning."""
+        self._beside: list[tuple[Place, ChainLink]] = []
+        """Those that are farther, and had to be so besides."""
         self.is_cut = False
         """Whether something is because of what was before."""
         self.broken: ChainRule | None = None
@@ -129,6 +131,7 @@ class Chain:
                 place, link = last[0]
                 last.insert(0, (place._replace(number=place.number + 1), ChainLink(link.time, "", BETWEEN(count=count))))
             shown += last
+        shown += [one for one in self._beside if one[1].root is not None][:LAST_SHOWN]
         found: dict[tuple[str, MessageText, Nanos | None], ChainLink] = {}
         for _, link in sorted(shown, key=lambda one: one[0], reverse=True):
             found.setdefault((link.subject, link.text, None if link.root is None else link.time), link)
@@ -137,7 +140,7 @@ class Chain:
     @property
     def is_over(self) -> bool:
         """Whether no more are taken."""
-        return self._next is None or len(self._followed) >= MOST_FOLLOWED
+        return self._next_shown is None and self._next_beside is None
 
     @property
     def is_followed(self) -> bool:
@@ -154,21 +157,31 @@ class Chain:
         """The nearest one that waits, of several the latest; beyond what is shown only what led there."""
         is_full = self._is_full
         waiting = (one for one in self._waiting if one.leads or not is_full)
-        return max(waiting, key=lambda one: (-one.distance, one.cause.place), default=None)
+        return max(waiting, key=_nearest, default=None)
+
+    @property
+    def _next_shown(self) -> _Waiting | None:
+        return self._next if len(self._followed) < MOST_FOLLOWED else None
+
+    @property
+    def _next_beside(self) -> _Waiting | None:
+        """The nearest one that had to be so besides, beyond what is shown."""
+        waiting = (one for one in self._waiting if not one.leads)
+        return max(waiting, key=_nearest, default=None) if self._is_full and len(self._beside) < MOST_FOLLOWED else None
 
     def go_on(self) -> None:
         """Take the next one."""
-        taken = self._next
+        taken = self._next_shown or self._next_beside
         if taken is None:
             return
         self._waiting.remove(taken)
         cause, key = taken.cause, (taken.cause.place, taken.cause.link)
-        if key in self._taken or key in self._followed:
+        if key in self._taken or key in self._followed or key in self._beside:
             return
-        if self._is_full:
-            self._followed.append(key)
-        else:
+        if not self._is_full:
             self._taken[key] = None
+        else:
+            (self._followed if taken.leads else self._beside).append(key)
         before = cause.before()
         led = () if before is None else (before, *before.along)
         is_owed = before is None and cause.before is not nothing
@@ -191,6 +204,10 @@ class Chain:
         is_rootless = is_owed and self._is_whole(effect.time)
         self.is_cut |= is_owed and not is_rootless
         rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_rootless else None)
-        if rule is not None:
+        if rule is not None and (leads or not self._is_full):
             self.broken = self.broken or rule
             self._taken[place._replace(number=place.number - 1), replace(effect, text=NOT_KNOWN(), root=None)] = None
+
+
+def _nearest(waiting: _Waiting) -> tuple[int, Place]:
+    return -waiting.distance, waiting.cause.place

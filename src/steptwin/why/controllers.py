@@ -20,7 +20,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Bytes, Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing
 from steptwin.why.log import BEGINS, LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.roots import Act, Sent
@@ -535,9 +535,11 @@ class ControllerCauses:
         return None
 
     def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
-        """The last statement before a moment that changes something: what it began has ended."""
+        """The last statement before a moment whose effect has ended then, along with one that changed the same meanwhile: the end
+        of a PULSE inverts what is there. Without one, the last that changes it."""
         if wanted is None:
             return None
+        later: FoundCause = None
         executed, programs, axes = self._log.executed[controller], self._all.programs, self._all.axes
         last = self._log.last_executed(controller, time)
         for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
@@ -545,12 +547,15 @@ class ControllerCauses:
             if executed[index].time < time and _matches(use.writes, wanted):
                 is_waiting = use.waits and (index == last or executed[index + 1].time >= time)
                 is_of_axis = wanted.kind is ResourceKind.AXIS and axes.is_moving(controller, wanted.name, time)
-                return covered(
-                    programs.statement(controller, index), Cover.WAIT if use.lasts or is_waiting or is_of_axis else None
-                )
+                found = programs.statement(controller, index)
+                if use.lasts or is_waiting or is_of_axis:
+                    return along(covered(found, Cover.WAIT), [covered(later, Cover.LEVEL)])
+                if wanted.kind is not ResourceKind.PIN:
+                    return found
+                later = later or found
         if last < MOST_LOOKED_BACK:
             self._log.lack()
-        return None
+        return later
 
     def _is_of_pin(self, record: TraceRecord, order: int) -> bool:
         """Whether an input acts by the level of a pin only."""

@@ -26,6 +26,7 @@ from steptwin.why.scripts import acted
 ALTHOUGH = Message("why.although", "{signal} is {value:g} although {other}")
 FAULT = Message("why.fault", "fault {name}: {what}")
 FAULT_ACTS = Message("why.fault-acts", "fault {name}, there from the beginning, acts: {what}")
+FAULT_HAS_NOT_ACTED = Message("why.fault-has-not-acted", "fault {name}, set and without effect until then: {what}")
 
 T = TypeVar("T")
 _FOLLOWED = {Relay: COIL, Brake: RELEASE}
@@ -118,7 +119,7 @@ class HoldingCauses:
         return Cause(link, place, nothing if act is None else lambda: covered(acted(act), Cover.FAULT), Cover.FAULT)
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
-        """A fault that has acted by a moment, as a cause: when it began, or acted first, where no record says that it began."""
+        """A fault as a cause, at a moment by which it has acted, or is set at least: when it began, or acted first, where no record says that it began."""
         record, active = self._log.fault_record(name, until), self._world.objects.faults.find(name)
         last = None if record is not None else self._log.before(f"{HAPPENED}fault {name}").since
         if last is not None and (there := self._all.of(last)) is not None:
@@ -127,6 +128,9 @@ class HoldingCauses:
         if record is not None:
             return ChainLink(record.time, record.controller, self._all.of_record(record), root)
         subject = "" if active is None else str(active.fault.get("element") or "")
+        acts = self._world.objects.faults.acts.get(name)
+        if active is not None and (acts is None or acts.first > until):
+            return ChainLink(active.begin, subject, FAULT_HAS_NOT_ACTED(name=name, what=str(active.fault)), root)
         text = FAULT if active is None or active.begin else FAULT_ACTS
         return ChainLink(root.time, subject, text(name=name, what="" if active is None else str(active.fault)), root)
 

@@ -179,7 +179,8 @@ class PastQuestions:
 
     def _trying(self, link: ChainLink, answers: Sequence[Answer], around: Nanos = 0, others: Sequence[Root] = ()) -> Trying:
         trying = trying_without(self._snapshots, link, answers, self._most, around=around, others=others)
-        return (yield from self._in_time(trying)) or [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=TIME_IS_OVER()))]
+        found = yield from self._in_time(trying)
+        return found or [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=TIME_IS_OVER())) for _ in answers]
 
     def _in_time(self, work: Generator[None, None, _T]) -> Generator[None, None, _T | None]:
         """Its result; None where the time is over before."""
@@ -193,11 +194,13 @@ class PastQuestions:
         return None
 
     def _masking(self, suspects: Sequence[str], answer: Answer) -> Generator[None, None, Sequence[ChainLink]]:
-        """Those of the suspects, and of the faults that hold signals, of which each is enough: without one something is the same,
-        without all it is otherwise."""
+        """Those of the suspects, of the faults that hold signals, and of those that are set but could not act yet, of which each is
+        enough: without one something is the same, without all it is otherwise."""
         faults = {link.root.name: link for link in answer.links if isinstance(link.root, SetFault)}
-        held = self._logs[0].past.log.holding(answer.at)
-        suspects = [*suspects, *sorted(name for name in held if name not in faults and name not in suspects)]
+        log, at = self._logs[0].past.log, answer.at
+        active = (one for one in log.world.objects.faults.active if one.begin <= at and (one.end is None or at < one.end))
+        others = {*log.holding(at), *(one.name for one in active if one.name not in log.world.objects.faults.acts)}
+        suspects = [*suspects, *sorted(others - {*faults, *suspects})[:MOST_SUSPECTS]]
         for name in suspects:
             faults[name] = yield from self._settled(
                 lambda known, name=name: known.find(lambda why: why.fault_link(name, answer.at))

@@ -50,7 +50,7 @@ IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
 SCRIPT_WAITS = Message("why.script-waits", "script {name} waits until {condition}: that is false")
-SCRIPT_DOES_NOT_WAIT = Message("why.script-does-not-wait", "script {name} waits for no condition at {at:g} s: ask about a signal")
+SCRIPT_DOES_NOT_WAIT = Message("why.script-does-not-wait", "script {name} waits for no condition at {at:g} s")
 PROGRAM_IS = Message("why.program-is", "{controller}: {held}")
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
@@ -510,7 +510,7 @@ class Why:
         other = yield from self.past.world_at(at)
         waiting = next((one.waiting for one in other.scripts if one.name == name), None)
         if waiting is None or not waiting.condition:
-            raise Misuse(SCRIPT_DOES_NOT_WAIT(name=name, at=at / SECOND))
+            return Answer(name, at, SCRIPT_DOES_NOT_WAIT(name=name, at=at / SECOND), None, (), is_complete=True)
         answer = yield from self._condition(waiting.condition, at)
         return answer._replace(question=name, state=SCRIPT_WAITS(name=name, condition=waiting.condition))
 

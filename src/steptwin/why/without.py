@@ -55,7 +55,7 @@ def trying_without(
     try:
         return (yield from _trying(snapshots, link, answers, most, around, others))
     except SteptwinError as error:
-        return [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))]
+        return [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error))) for _ in answers]
 
 
 def _trying(
