@@ -247,8 +247,9 @@ class Causes:
         return ChainLink(record.time, record.controller, self.of_record(record), self.fault_root(record.subject, record.time))
 
     def of_record(self, record: TraceRecord) -> MessageText:
-        """A fault in words; of one that altered what went over a line, with that."""
-        text, altered = FAULT(name=record.subject, what=record.value), self.controllers.altered(record)
+        """A fault in words; of one that altered what went over a line, or let a controller refuse a request, with that."""
+        what, altered = self.controllers.not_served(record), self.controllers.altered(record)
+        text = FAULT(name=record.subject, what=record.value if what is None else what)
         return text if altered is None else ALTERED(fault=text, request=altered)
 
     def fault_root(self, name: str, until: Nanos) -> SetFault:

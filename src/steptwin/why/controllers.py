@@ -10,6 +10,7 @@ from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
+from steptwin.simulation.faults.controller import REFUSED_REQUEST
 from steptwin.simulation.faults.kinds_physics import NO_SUPPLY
 from steptwin.simulation.faults.port import TOWARDS_THE_TWIN
 from steptwin.simulation.kinds.lines import SCRIPTS
@@ -24,8 +25,8 @@ from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing
 from steptwin.why.log import BEGINS, LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.roots import Act, Sent
-from steptwin.why.scripts import FROM_OUTSIDE
-from steptwin.why.sentences import describe_input
+from steptwin.why.scripts import FROM_OUTSIDE, acted
+from steptwin.why.sentences import SENDS, SENDS_TO
 from steptwin.wire.crc import with_crc
 
 CLIENT = Message("why.client", "client {client}: {meaning}")
@@ -252,7 +253,8 @@ class ControllerCauses:
             if on is not None and isinstance(what, Bytes) and what.line == on[0].name and _is_spoilt(what, on[1]):
                 text = WRONG_CHECKSUM(request=CLIENT(client=what.place, meaning=self.sends(what, act.time)))
                 link = ChainLink(act.time, what.line, text)
-                found.append(Cause(link, Place(act.time, act.order, 1), partial(self._all.scripts.acted, act)))
+                sends = SENDS(data=self.sends(what, act.time), place=what.place)
+                found.append(Cause(link, Place(act.time, act.order, 1), partial(self._all.scripts.acted, act, sends)))
         found.sort(key=lambda one: one.place, reverse=True)
         return (one for one in found if after < one.place.time <= until and one.place.order < before)
 
@@ -270,7 +272,21 @@ class ControllerCauses:
             if isinstance(act.what, Bytes) and act.what.line == line and act.what.place in places:
                 return self.sends(act.what, act.time)
             if SCRIPTS in places and _requests(act, line, members):
-                return describe_input(act.what)
+                return acted(act).link.text
+        return None
+
+    def not_served(self, record: TraceRecord) -> MessageText | None:
+        """A fault by which a controller served no request, with who sent that, in words; None for another fault, or where that is
+        not known."""
+        on, text = self._world.objects.line_of.get(record.controller), record.value
+        if on is None or not isinstance(text, MessageText) or text.id != REFUSED_REQUEST.id:
+            return None
+        asked = bytes.fromhex(str(text.values["bytes"]))
+        for order, request in reversed(self._log.frames.sent.items()):
+            if request.controller == on[0].name and request.time <= record.time and asked in request.data():
+                sent = self._frame(request, order)
+                by = sent.before() or sent
+                return REFUSED_REQUEST(what=text.message("what") or text.values["what"], bytes=by.link.text)
         return None
 
     def unheard(self, controller: str, wanted: Resource | None, until: Nanos, after: Nanos = -1) -> FoundCause:
@@ -582,7 +598,9 @@ class ControllerCauses:
         act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
         if act is None:
             self._log.lack()
-        return None if act is None else covered(self._all.scripts.acted(act), Cover.FRAME)
+            return None
+        what = SENDS_TO(data=meaning, line=record.controller) if isinstance(act.what, do.Request) else None
+        return covered(self._all.scripts.acted(act, what), Cover.FRAME)
 
     def _input(self, record: TraceRecord, order: int) -> Cause:
         act = next(self._log.acts_at(record.time, order), None)

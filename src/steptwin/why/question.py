@@ -123,6 +123,7 @@ class Why:
         signals = tuple(canonical.values())
         first = self.causes.lasting(signals, at, changed)
         first = self._with_refused(signals, at, since, first)
+        first = along(first, [*self._unstopped(signals, at, since)])
         if first is not None or since is not None:
             holding = self.causes.holding.of(self._deciding(asked, canonical, at), at, since)
             others = (*self._unseen(shown, at, -1 if since is None else since), *self._again(signals, since, at))
@@ -277,6 +278,15 @@ class Why:
                     first = refused if first is None else first._replace(along=(*first.along, refused))
         return first
 
+    def _unstopped(self, signals: Sequence[str], at: Nanos, since: Nanos | None) -> Iterator[Cause]:
+        """The requests since a moment that would have changed the motions of axes that are under way, and were not served."""
+        for controller, wanted in self.past.changeable(signals, at):
+            registers = self.world.kind(controller).registers if wanted.kind is ResourceKind.AXIS else None
+            if registers is not None and self.causes.axes.is_moving(controller, wanted.name, at):
+                after = -1 if since is None else since
+                names = registers.uses(wanted.name)
+                yield from filter(None, [self.causes.controllers.refused(controller, names, at, after=after)])
+
     def _deciding(self, asked: str, canonical: Mapping[str, str], at: Nanos) -> tuple[str, ...]:
         """The signals of a condition without whose values it would be otherwise; none where some are not noted."""
         signals = tuple(canonical.values())
@@ -412,6 +422,7 @@ class Why:
             _, since = yield from self.values.from_run(is_value, {signal: full}, at, is_bare=False)
             since = self.log.before(is_value).since if since is None else since
         first = self.causes.changes.unrecorded(full, at)
+        first = along(first, [*self._unstopped((full,), at, None if first is None else first.place.time)])
         return (yield from self._answer(signal, at, state, since, first))
 
     def _wait(self, controller: str, at: Nanos) -> Asking:

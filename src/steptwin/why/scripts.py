@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
@@ -27,10 +27,10 @@ class ScriptCauses:
         self._all = causes
         self._names = QuestionNames(causes.log)
 
-    def acted(self, act: Act) -> Cause:
+    def acted(self, act: Act, what: MessageText | None = None) -> Cause:
         """An action, which follows what its script waited for last. Where faults are set and cleared that is of the test, not of
-        the machine."""
-        cause = acted(act)
+        the machine. ``what``: as that of the function."""
+        cause = acted(act, what)
         ended = None if act.fault or isinstance(act.what, do.ClearFault) else self._wait_before(act)
         return cause if ended is None else cause._replace(before=partial(given, ended))
 
@@ -57,8 +57,8 @@ class ScriptCauses:
         return any(one.when is not None for one in scripts) or any(isinstance(step, do.Until | do.UntilOver) for step in steps)
 
 
-def acted(act: Act) -> Cause:
-    """An action for itself."""
-    what = describe_input(act.what) if not act.fault else SETS_A_FAULT(name=act.fault)
+def acted(act: Act, what: MessageText | None = None) -> Cause:
+    """An action for itself. ``what``: it in words, where its bytes have a meaning."""
+    what = what or (describe_input(act.what) if not act.fault else SETS_A_FAULT(name=act.fault))
     text = SCRIPT(name=act.by, what=what) if act.by else FROM_OUTSIDE(what=what)
     return Cause(ChainLink(act.time, act.by or "outside", text, act), Place(act.time, act.order), nothing)
