@@ -119,7 +119,8 @@ class HoldingCauses:
         return Cause(link, place, nothing if act is None else lambda: covered(acted(act), Cover.FAULT), Cover.FAULT)
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
-        """A fault as a cause, at a moment by which it has acted, or is set at least: when it began, or acted first, where no record says that it began."""
+        """A fault as a cause, at a moment by which it has acted, or is at least set: when it began, or acted first, where no
+        record says when it began."""
         record, active = self._log.fault_record(name, until), self._world.objects.faults.find(name)
         last = None if record is not None else self._log.before(f"{HAPPENED}fault {name}").since
         if last is not None and (there := self._all.of(last)) is not None:

@@ -194,8 +194,8 @@ class PastQuestions:
         return None
 
     def _masking(self, suspects: Sequence[str], answer: Answer) -> Generator[None, None, Sequence[ChainLink]]:
-        """Those of the suspects, of the faults that hold signals, and of those that are set but could not act yet, of which each is
-        enough: without one something is the same, without all it is otherwise."""
+        """Those of the suspects, of the faults that hold signals, and of those that are set but could not act yet, of which each
+        is enough: without one something is the same, without all it is otherwise."""
         faults = {link.root.name: link for link in answer.links if isinstance(link.root, SetFault)}
         log, at = self._logs[0].past.log, answer.at
         active = (one for one in log.world.objects.faults.active if one.begin <= at and (one.end is None or at < one.end))

@@ -104,20 +104,23 @@ class PresentStates:
             yield ChainLink(self._at, controller, IS_DEFERRED(statement=statement_at(self._world.programs[controller], where)))
             yield from self.of([(controller, one) for one in label.reads], controller)
 
-    def motion(self, controller: str, number: str) -> _Links:
-        """Motions of an axis, of all if ``number`` is empty, that need something to end. Returns the inputs that can do that."""
-        pins: list[_Asked] = []
+    def motion(self, controller: str, number: str) -> Iterator[ChainLink]:
+        """Motions of an axis, of all if ``number`` is empty, that need something to end."""
+        for axis, pin in self._endless(controller, number):
+            text = MOVES_UNTIL(axis=axis, pin=f"{controller}.{pin}") if pin else HAS_NO_INPUT(axis=axis) if pin == "" else None
+            yield ChainLink(self._at, controller, text or MOVES_WITHOUT_TARGET(axis=axis))
+
+    def ending(self, controller: str, number: str) -> list[str]:
+        """The inputs that can end those motions."""
+        return [f"{controller}.{pin}" for _, pin in self._endless(controller, number) if pin]
+
+    def _endless(self, controller: str, number: str) -> Iterator[tuple[str, str | None]]:
         for plan in self._log.plans_in_force(controller, number, self._at):
             record = self._log.record(plan)
-            profile, axis = profile_of(record.plan()), f"{controller}.M{record.subject}"
-            if not profile.segments or profile.end is not None:
-                continue
-            pin = self._world.kind(controller).ends_motion(self._world.controller(controller), int(record.subject))
-            if pin:
-                pins.append(f"{controller}.{pin}")
-            text = MOVES_UNTIL(axis=axis, pin=pins[-1]) if pin else HAS_NO_INPUT(axis=axis) if pin == "" else None
-            yield ChainLink(self._at, controller, text or MOVES_WITHOUT_TARGET(axis=axis))
-        return pins
+            profile = profile_of(record.plan())
+            if profile.segments and profile.end is None:
+                pin = self._world.kind(controller).ends_motion(self._world.controller(controller), int(record.subject))
+                yield f"{controller}.M{record.subject}", pin
 
     def _signal(self, name: str, waits: str) -> _Links:
         owner = name.partition(".")[0]
@@ -192,7 +195,8 @@ class PresentStates:
                 yield ChainLink(self._at, controller, NO_AXIS_HAS_MOVED(time=self._at / SECOND))
             elif motion is not None:
                 yield motion.link
-            return (yield from self.motion(controller, resource.name))
+            yield from self.motion(controller, resource.name)
+            return self.ending(controller, resource.name)
         if resource.kind is ResourceKind.REQUEST and self._log.reaches_begin():
             if self._causes.controllers.written(controller, resource.name, self._at) is None:
                 yield ChainLink(self._at, controller, NEVER_SET(name=resource.name))

@@ -129,16 +129,19 @@ class Why:
             others = (*self._unseen(shown, at, -1 if since is None else since), *self._again(signals, since, at))
             off = yield from self._switched_off(self.past.changeable(signals, at), at)
             queued = yield from self._queued(signals, at)
-            first = along(first, [*holding, *others, *off, *queued])
-            present, holding = (yield from self._present(at)), self.causes.holding
+            present = yield from self._present(at)
+            endless, pins = self._endless(present, signals, at)
+            moved = (yield from self.resting.moved(pins, at)) if pins else None
+            first = along(first, [*holding, *others, *off, *queued, moved])
+            holding = self.causes.holding
             owners = {one: self.world.axes.get(one.removesuffix(".power")) for one in signals}
             given = [one if owners[one] is None else self.causes.axes.power_of(one.removesuffix(".power")) for one in signals]
             finds_nothing = partial(self.causes.workpieces.finds_nothing, at=at)
             told = [
                 one for one in given if holding.remembers(one, at, {}) or any(map(finds_nothing, self.past.behind((one,), at)))
             ]
-            states = present.of([one for one in told if self.log.has(one)])
-            return self._after(present, list(states), (yield from self._answer(text, at, state, since, first)))
+            states = [*endless, *present.of([one for one in (*told, *pins) if self.log.has(one)])]
+            return self._after(present, states, (yield from self._answer(text, at, state, since, first)))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
         resting = resting or (yield from self.resting.standing(signals, at))
@@ -164,6 +167,16 @@ class Why:
         says_more = resting is not None or len(states) > len(signals)
         says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
         return self._after(present, states if says_more else [], answer)
+
+    def _endless(self, present: PresentStates, signals: Sequence[str], at: Nanos) -> tuple[list[ChainLink], Sequence[str]]:
+        """The motions at a moment of the axes that signals are about which do not end by themselves, and the inputs that end
+        them."""
+        links, pins = list[ChainLink](), list[str]()
+        for controller, wanted in self.past.changeable(signals, at):
+            if wanted.kind is ResourceKind.AXIS:
+                links += present.motion(controller, wanted.name)
+                pins += present.ending(controller, wanted.name)
+        return links, pins
 
     def _again(self, signals: Sequence[str], since: Nanos | None, at: Nanos) -> Iterator[Cause]:
         """Events that began controllers anew, could have changed signals since, and have led to nothing."""
