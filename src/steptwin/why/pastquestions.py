@@ -23,7 +23,7 @@ from steptwin.why.causes import AND, Causes
 from steptwin.why.lacking import Found, Lacking
 from steptwin.why.log import LAST, in_parts
 from steptwin.why.notedpast import NotedPast
-from steptwin.why.question import Asking, Why
+from steptwin.why.question import PROGRAM_IS, Asking, Why
 from steptwin.why.roots import Act, Root, SetFault
 from steptwin.why.scripts import acted
 from steptwin.why.search import Asked, LastChanges, Snapshots
@@ -236,7 +236,8 @@ class PastQuestions:
         for controller, is_held in standing.items():
             stands = yield from self._settled(lambda known, controller=controller: self._answer(known, controller, answer.at))
             time, text = answer.at if stands.since is None else stands.since, stands.state.message("held") or stands.state
-            led = stands.links if is_held else [link for link in stands.links if link.time == answer.at]
+            is_over = stands.state.id == PROGRAM_IS.id and time > (answer.since or 0)
+            led = stands.links if is_held or is_over else [link for link in stands.links if link.time == answer.at]
             known = {(link.subject, link.text) for link in links}
             if (controller, text) not in known:
                 every = (ChainLink(time, controller, text, is_stand=not is_held), *led)

@@ -469,8 +469,7 @@ class Why:
             state = PROGRAM_IS(controller=controller, held=ended.link.text)
             return (yield from self._answer(controller, at, state, ended.link.time, _led_to(ended)))
         present = yield from self._present(at)
-        links = list(present.awaited(controller))
-        is_done = at - here.time > log.world.programs[controller].statement_time
+        links, is_done = list(present.awaited(controller)), at - here.time > log.world.programs[controller].statement_time
         polling = causes.programs.polling(controller, index)
         if polling is not None:
             loop = causes.programs.conditions_of_loop(controller, index)
@@ -485,16 +484,19 @@ class Why:
         unheard = None if present.waits(controller, use) else causes.controllers.unheard(controller, None, at, here.time)
         if polling is not None or not use.waits or not is_done:
             going_on = yield from self._going_on(controller, index, index if polling is None else polling, at)
-            first = along(going_on, [unheard])
-            return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
+            return self._after(
+                present, links, (yield from self._answer(controller, at, state, since, along(going_on, [unheard])))
+            )
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
         waiting = causes.programs.statement(controller, index)
         known = {one: cause for one, cause in found.items() if cause.place < waiting.place}
         others = [cause._replace(cover=Cover.LEVEL) for one, cause in known.items() if not self._is_held(controller, one, at)]
-        changed = [cause for cause in found.values() if cause.link.time > here.time]
-        last = max(changed, key=lambda cause: cause.link.time, default=None)
-        since = last.link.time if last is not None and state.id == PROGRAM_IS.id else since
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
+        changed = (cause for cause in found.values() if cause.link.time > here.time)
+        last = max(changed, key=lambda cause: cause.link.time, default=None)
+        if state.id == PROGRAM_IS.id:
+            last = last if not pins else (yield from self._that_ended(controller, use, pins, here.time, at))
+            since = since if last is None else last.link.time
         resting = ((yield from self.resting.moved(pins, at)) or self.resting.held(pins, at)) if last is None else None
         holding = [one for pin in pins for one in self.causes.holding.of((pin,), at, self.log.since(pin, at))]
         waiting = waiting._replace(cover=Cover.WAIT, besides=lambda: others)
@@ -505,6 +507,18 @@ class Why:
         lasting = (*lasting, *self._unseen(pins, at, here.time))
         first = along(first, [waiting, *lasting, unheard])
         return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
+
+    def _that_ended(
+        self, controller: str, use: StatementUse, pins: Sequence[str], since: Nanos, at: Nanos
+    ) -> Generator[None, None, FoundCause]:
+        """The change with which a wait since a moment was over that a program executed last; None where it did not wait."""
+        begun = min(at, since + self.world.programs[controller].statement_time)
+        is_waiting = (yield from self._present(begun)).waits(controller, use)
+        changes = [(one, pin) for pin in pins for one in self.log.changes_before(pin, at) if one.time > since]
+        for one, pin in sorted(changes, key=lambda change: change[0].order) if is_waiting else ():
+            if not (yield from self._present(one.time)).waits(controller, use):
+                return self.causes.change(pin, one)
+        return None
 
     def _going_on(self, controller: str, index: int, begun: int, at: Nanos) -> Generator[None, None, FoundCause]:
         """Cause for which a program that waits at no statement has come to one, or to the loop in which it is since ``begun``,
