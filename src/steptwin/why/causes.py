@@ -205,6 +205,9 @@ class Causes:
         if ended is not None:
             older = (one for one in self._older_fault(signal, change.time) if one.link.root != ended.link.root)
             return ended._replace(along=(*ended.along, *older))
+        first = self._bounce_of(signal, change)
+        if first is not change:
+            return covered(self.change(signal, first, CONTACT_BOUNCED()), Cover.BOUNCE)
         if owner in self.parts:
             return self.elements.of_inputs(owner, change, signal)
         if owner in self._world.controllers:
@@ -226,6 +229,16 @@ class Causes:
                     link = self.fault_link(record)
                     return Cause(link, Place(record.time, change.order, -2), self.of_fault(record, order))
         return None
+
+    def _bounce_of(self, signal: str, change: Change) -> Change:
+        """The change of a contact with which it began to bounce; the change itself, where it does not bounce then."""
+        longest = self.contacts[signal].bounce_ns if signal in self.contacts else 0
+        first = change
+        while longest and (earlier := self.log.last_change(signal, first.time - 1)) is not None:
+            if change.time - earlier.time > longest or self.log.is_first(signal, earlier):
+                break
+            first = earlier
+        return first
 
     def _cleared(self, signal: str, change: Change) -> FoundCause:
         """The action at the moment of a change that cleared the fault which had held a signal."""
