@@ -106,13 +106,19 @@ def test_statements_of_wbc() -> None:
     assert [use_of(steps, number) for number in range(len(steps) + 1)] == WBC_USES
 
 
+@pytest.mark.parametrize(("value", "level"), [("ON", 1.0), ("0", 0.0), ("7", 1.0), ("IN1", None), ("x", None)])
+def test_levels_that_a_statement_always_sets(value: str, level: float | None) -> None:
+    steps = loaded(f"x = 0\nOUT2 = {value}\n")[0].steps
+    assert use_of(steps, 1).sets == level
+
+
 @pytest.mark.parametrize(
     ("text", "use"),
     [
         ("O3", StatementUse((pin("B3"),), waits=True)),
         ("Z21", StatementUse((pin("B21"),), waits=True)),
-        ("T2", StatementUse(writes=(pin("B2"),))),
-        ("C1", StatementUse(writes=(pin("B1"),))),
+        ("T2", StatementUse(writes=(pin("B2"),), sets=1.0)),
+        ("C1", StatementUse(writes=(pin("B1"),), sets=0.0)),
         ("T", StatementUse((value("variable"),), (ANY_PIN, *SIGNALS), keeps=True)),
         ("T40", StatementUse(writes=(*SIGNALS, value("function40")))),
         ("T41", StatementUse(writes=(value("function41"),))),

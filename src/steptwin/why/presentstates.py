@@ -263,7 +263,8 @@ class PresentStates:
         if programs.stands(owner, at) is not None and not programs.may_write(owner, pin):
             return ()
         waiting, wanted = self._log.last_executed(owner, at), Resource(ResourceKind.PIN, pin)
-        if is_of_other and waiting >= 0 and programs.is_written(owner, wanted) and not programs.leads_to(owner, waiting, wanted):
+        comes = waiting < 0 or programs.leads_to(owner, waiting, wanted, at)
+        if is_of_other and not comes and programs.is_written(owner, wanted):
             yield from self._stands(owner, waiting)
         return (yield from self._before(owner, wanted))
 
@@ -299,7 +300,7 @@ class PresentStates:
         for."""
         log, programs, at = self._log, self._causes.programs, self._at
         held, index = programs.stands(owner, at), log.last_executed(owner, at)
-        comes = index >= 0 and programs.leads_to(owner, index, wanted)
+        comes = index >= 0 and programs.leads_to(owner, index, wanted, at)
         if held is not None:
             yield held.link if held.place.order >= 0 or log.reaches_begin() else replace(held.link, time=at)
             by = held.before()

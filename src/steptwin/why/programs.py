@@ -115,8 +115,9 @@ class ProgramCauses:
         besides = lambda: (*reads[1:], *self._unchanged(controller, index, place))  # noqa: E731
         return Cause(link, place, before, Cover.LEVEL, besides)
 
-    def leads_to(self, controller: str, index: int, wanted: Resource) -> bool:
-        """Whether the program can still come from an executed statement to one that changes something, without an interrupt."""
+    def leads_to(self, controller: str, index: int, wanted: Resource, at: Nanos) -> bool:
+        """Whether the program can still come from an executed statement to one that changes something, without an interrupt. One
+        that gives an output the level that it has at a moment does not change it."""
         location, programs = self._log.executed[controller][index].location, self._world.programs[controller]
         if not self._log.is_of_present_text(self._log.executed[controller][index]):
             return False
@@ -125,11 +126,10 @@ class ProgramCauses:
         if location.number not in programs.reached(location.text, following):
             numbers.discard(location.number)  # it is executed, and does not come again
         others = [one for one in self._all.interrupts.handlers(controller, location.text) if location.number not in one]
-        return any(
-            wanted in programs.use(StatementLocation(location.text, number)).writes
-            for number in numbers
-            if not any(number in handler for handler in others)
-        )
+        signal = f"{controller}.{wanted.name}"
+        level = self._log.level(signal, at) if wanted.kind is ResourceKind.PIN and self._log.has(signal) else None
+        uses = [programs.use(StatementLocation(location.text, one)) for one in numbers if not any(one in of for of in others)]
+        return any(wanted in use.writes and (level is None or use.sets != level) for use in uses)
 
     def before(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
         """Cause for which no statement has changed something by a moment: the program is held, has decided against it, or waits
@@ -138,9 +138,8 @@ class ProgramCauses:
             return None
         held = self.prevented(controller, wanted, at)
         index = self._log.last_executed(controller, at)
-        if held is not None or index < 0 or not self.use(controller, index).waits or not self.leads_to(controller, index, wanted):
-            return held
-        return self.waiting(controller, index)
+        waits = held is None and index >= 0 and self.use(controller, index).waits
+        return self.waiting(controller, index) if waits and self.leads_to(controller, index, wanted, at) else held
 
     def made_in_vain(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
         """The last statement by a moment that would have changed something until what it waited for was there, which it was."""
@@ -165,7 +164,7 @@ class ProgramCauses:
         """Cause that holds a program at a moment, or the condition that decided against a statement that changes something; both
         where the program could not come to one any more when it was held."""
         held, index = self.stands(controller, at), self._log.last_executed(controller, at)
-        if held is not None and (index < 0 or self.leads_to(controller, index, wanted)):
+        if held is not None and (index < 0 or self.leads_to(controller, index, wanted, at)):
             return held
         against = self.decided_against(controller, wanted, at)
         return held if against is None else against._replace(along=() if held is None else (held,))

@@ -331,7 +331,7 @@ class Why:
             is_over = (
                 wanted.kind is ResourceKind.AXIS and since is not None and index >= 0 and programs.is_over(controller, index, at)
             )
-            if index < 0 or not (is_over or programs.leads_to(controller, index, wanted)):
+            if index < 0 or not (is_over or programs.leads_to(controller, index, wanted, at)):
                 continue
             held = programs.held(controller, at) or programs.ended(controller, index, at)
             if is_over and held is None and programs.is_written(controller, wanted):

@@ -101,7 +101,7 @@ class RestingCauses:
             owner, _, pin = name.partition(".")
             index = self._log.last_executed(owner, at) if owner in self._world.programs else -1
             is_held = index >= 0 and programs.held(owner, at) is not None
-            if index >= 0 and not is_held and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+            if index >= 0 and not is_held and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin), at):
                 use = programs.use(owner, index)
                 yield from ((owner, one) for one in use.reads if use.waits)
                 loop = () if use.waits and use.reads else programs.conditions_of_loop(owner, index)

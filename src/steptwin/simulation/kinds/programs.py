@@ -87,6 +87,8 @@ class StatementUse(NamedTuple):
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
     edges: tuple[tuple[float, float], ...] = ()
     """Levels that the pin which it reads has to take, by values of what it acts by; with another value it may be either."""
+    sets: float | None = None
+    """Level that it gives to the outputs which it writes, where that is always the same."""
 
 
 class WriteUse(NamedTuple):

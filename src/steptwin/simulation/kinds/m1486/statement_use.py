@@ -49,6 +49,7 @@ def use_of(command: ChipCommand, operands: ChipState = NOTHING) -> StatementUse:
         acts_by=(_DISTANCE,) if ChipState.DISTANCE in use.reads else (),
         made_by=tuple(_value(one.value) for one in _SPEEDS.get(use.motion, ())),
         keeps=bool(use.writes & _KEPT),
+        sets=float(use.level) if use.level is not None and command.lines and ChipState.LINES in use.writes else None,
     )
 
 

@@ -35,6 +35,7 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
         acts_by=tuple(_acted_by(step)),
         keeps=keeps,
         edges=_EDGES if isinstance(step, s.InterruptStep) and step.event.input else (),
+        sets=_level(step),
     )
 
 
@@ -100,6 +101,13 @@ def _set_by(step: s.SetStep) -> tuple[tuple[Resource, ...], bool]:
         return (*targets, *_pins_of_axis(step.target)), False
     register = Resource(ResourceKind.VALUE, step.target.name)
     return tuple(dict.fromkeys((*targets, register))), True
+
+
+def _level(step: s.ProgramStep) -> float | None:
+    match step:
+        case s.SetStep(target=s.RegisterOperand(row=row), value=s.Literal(value=value)) if row.key == "OUT":
+            return float(value != 0.0)
+    return None
 
 
 def _pins_of_axis(target: s.AssignmentTarget) -> Iterable[Resource]:
