@@ -370,10 +370,8 @@ class ProgramCauses:
         moves = (one for one in range(index - 1, max(-1, index - MOST_BEFORE_WAIT), -1) if _moves(self.use(controller, one)))
         command = next(moves, None)
         axes = ("", *(str(one) for one in range(1, len(self._world.controllers[controller].axes) + 1)))
-        events = [
-            event for one in axes if (event := self._log.last_axis_event(controller, one, here.time, here.order)) is not None
-        ]
-        event = max(events, key=lambda one: one.order, default=None)
+        events = (self._log.last_axis_event(controller, one, here.time, here.order) for one in axes)
+        event = max((one for one in events if one is not None), key=lambda one: one.order, default=None)
         if event is None or command is None or not executed[command].order < event.order < executed[command + 1].order:
             return None
         return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.PROGRAM)
@@ -656,7 +654,7 @@ class ProgramCauses:
             return Cause(link, place, self._all.at_begin, Cover.LEVEL, partial(self._holding, controller, change))
         where = ""
         index = self._log.last_executed(controller, change.time)
-        if change.state is not ProgramState.STOPPED and index >= 0:
+        if change.state is not ProgramState.STOPPED and index >= 0 and not self._was_over(controller, index, change.time):
             where = WHERE(statement=statement(self._log, self._log.executed[controller][index]))
         text = HELD[change.state](where=where)
         if change.state is ProgramState.STOPPED and index >= 0 and self._is_end(controller, index, change):
@@ -664,6 +662,11 @@ class ProgramCauses:
         link = ChainLink(change.time, controller, text)
         by = partial(self._all.controllers.of_program, controller, change)
         return Cause(link, Place(change.time, change.order), by, Cover.LEVEL, partial(self._holding, controller, change))
+
+    def _was_over(self, controller: str, index: int, at: Nanos) -> bool:
+        """Whether a program may have been over by a moment, with no motion of its last command going on."""
+        is_last = self._log.executed[controller].locations[index].number < 0 or self.is_last(controller, index)
+        return is_last and not (_moves(self.use(controller, index)) and self._all.axes.is_moving(controller, "", at))
 
     def _is_end(self, controller: str, index: int, change: StateChange) -> bool:
         """Whether the statement that was executed last ended its program when that was stopped."""

@@ -260,7 +260,7 @@ class Why:
             if index < 0 and not waiting.is_filed:  # what it waits behind was before
                 self.log.lack()
             elif waiting.is_filed or programs.use(controller, index).waits:
-                ahead = None if waiting.is_filed else programs.waiting(controller, index)
+                ahead = None if waiting.is_filed else programs.held(controller, at) or programs.waiting(controller, index)
                 sent = self.causes.controllers.sent(controller, waiting.code, index + 1, at)
                 text = (IS_FILED if waiting.is_filed else IS_QUEUED)(command=waiting.code)
                 led = partial(along, sent, [ahead])
