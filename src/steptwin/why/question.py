@@ -30,7 +30,7 @@ from steptwin.why.sentences import IS_NUMBER, statement, value_with_unit
 from steptwin.why.states import is_constant, rest_of
 from steptwin.why.values import SignalValues
 
-MOST_SNAPSHOTS = 5
+MOST_SNAPSHOTS = 8
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
 
