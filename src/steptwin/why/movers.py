@@ -50,8 +50,8 @@ class NotedMeetings:
         """The signals that moved what a beam sees or a collision compares, by its name, at its changes."""
 
         self.holders: dict[tuple[str, Nanos], str] = {}
-        """The workpiece before one that comes to stand on a belt, or the terminal of the stop that holds it, by its name and
-        the moment."""
+        """The workpiece before one that comes to stand on a belt, the pusher, or the terminal of the stop that holds it, by its
+        name and the moment."""
         carriers = (one for parts in world.objects.elements.values() for one in parts.items() if isinstance(one[1], Carrier))
         self._met = {name: _Met(world, name, one.grip) for name, one in carriers if isinstance(one.grip, BeltGrip)}
 
@@ -70,6 +70,10 @@ class NotedMeetings:
         if ahead is not None:
             self.holders[workpiece, now] = ahead[1].workpiece.name
             return
+        for bar in belt.bars:
+            if bar.workpiece == workpiece and abs(bar.place - placed.held) <= belt.from_nm(TOUCH_NM):
+                self.holders[workpiece, now] = bar.by
+                return
         for number, stop in enumerate(self._conveyors[conveyor].spec.stops, start=1):
             if belt.to_grid(stop.at) == placed.held:
                 self.holders[workpiece, now] = f"{conveyor}.{stop_terminal(number).lower()}"

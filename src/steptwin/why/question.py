@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from typing import TypeAlias
 
 from steptwin.controller import SECOND, Nanos
@@ -30,12 +31,21 @@ from steptwin.why.sentences import IS_NUMBER, statement, value_with_unit
 from steptwin.why.states import is_constant, rest_of
 from steptwin.why.values import SignalValues
 
+MOST_BEFORE = 5
+"""Limit of the causes between a workpiece that stays and the output that keeps it, with both."""
 MOST_SNAPSHOTS = 8
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
+
+
+def back_from(cause: FoundCause) -> Iterator[Cause]:
+    """A cause and those before it, one after the other."""
+    while cause is not None:
+        yield cause
+        cause = cause.before()
 
 
 def _led_to(effect: Cause) -> Cause | None:
@@ -354,7 +364,7 @@ class Why:
         held = [
             one for name in names if name in self.log.changes for one in causes.holding.of((name,), at, self.log.since(name, at))
         ]
-        led = {one.place for cause in held for one in (cause, cause.before()) if one is not None}
+        led = {one.place for cause in held for one in islice(back_from(cause), MOST_BEFORE)}
         for controller, wanted in self.past.changeable(names, at) if led else ():
             last = causes.last((f"{controller}.{wanted.name}",), at) if wanted.kind is ResourceKind.PIN else None
             if last is not None and last.place in led:

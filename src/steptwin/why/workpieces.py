@@ -23,6 +23,7 @@ from steptwin.why.log import LAST, Change, words_of
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED, STANDS
 from steptwin.why.roots import Act
 
+STANDS_BEFORE = Message("why.stands-before", "{name} is in the way of {workpiece}")
 HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
 IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
 NOT_FED_SINCE = Message("why.not-fed-since", ", and {name} was not fed since")
@@ -160,8 +161,13 @@ class WorkpieceCauses:
         return None if what == "on" and cause is not None and cause.place.time < event.time else cause
 
     def _holder(self, workpiece: str, event: Change) -> FoundCause:
-        """The workpiece before one that comes to stand, where that stands or moves more slowly, or the stop that holds it."""
+        """The workpiece before one that comes to stand, where that stands or moves more slowly, or the pusher or stop that holds
+        it."""
         by = self._log.meetings.holders.get((workpiece, event.time), "")
+        if getattr(self._all.specs.get(by), "pushes", False):
+            time, order, number = event.time, event.order, -1
+            moved = partial(covered, self._all.elements.of_followed(by, event), Cover.LEVEL)
+            return Cause(ChainLink(time, by, STANDS_BEFORE(workpiece=workpiece, name=by)), Place(time, order, number), moved)
         if by in self._log.events:
             last = next(self._log.events_before(by, event), None)
             return self.rests(by, event) or (None if last is None else covered(self.event(last), Cover.LEVEL))
@@ -250,14 +256,13 @@ class WorkpieceCauses:
     ) -> Iterator[FoundCause]:
         """Reasons why no workpiece comes to a place of a belt, mm, before a change, as none has since a moment, but those that
         have been ``seen``. ``onto``: the belts behind it, of which it may be the next one: belts may lie in a ring."""
-        stopped = self._stopped(belt, change)
-        if stopped is not None:
+        lasts, stopped = self._last_events(belt, seen, change), self._stopped(belt, change)
+        here = [] if lasts is None else self._here(belt, lasts, change)
+        if stopped is not None and (lasts is None or here):  # an empty belt brings nothing, whether it runs or not
             yield stopped
             return
-        lasts = self._last_events(belt, seen, change)
         if lasts is None:
             return
-        here = self._here(belt, lasts, change)
         held = [one for one in here if self._what(one) == STANDS and self._place(one) < place]
         if held:
             yield self.rests(self._workpiece(max(held, key=self._place)), change)
