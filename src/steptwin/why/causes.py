@@ -91,7 +91,10 @@ class Causes:
         owner, place = signal.partition(".")[0], Place(change.time, change.order)
         if self.log.is_first(signal, change):
             return self.first(signal, how, place)
-        seen = self.log.meetings.seen.get((signal, change.time), ())
+        is_forced = any(
+            self.log.hold(signal, one) is not None for one in (change.time, change.time - 1)
+        )  # a fault began or ended
+        seen = () if is_forced else self.log.meetings.seen.get((signal, change.time), ())
         words = self._as_it_is(signal, how)
         words = BY(name=seen[0], how=words) if len(seen) == 1 else words  # of a beam or sensor
         text = BECAME(signal=signal, value=change.value, how=words)

@@ -81,7 +81,7 @@ class NotedMeetings:
     def sees(self, signal: str, now: Nanos) -> None:
         """A signal changes, which may be that of a sensor."""
         beam, sensor = self._beams.get(signal), self._sensors.get(signal)
-        if beam is not None:
+        if beam is not None and beam.by:
             name = beam.block.name
             self.seen[signal, now] = (beam.by,)
             self.movers[name, now] = movers(self._world, name, beam.by, now, self._along[name])
