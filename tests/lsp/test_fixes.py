@@ -124,7 +124,7 @@ NOT_FIXED = {
     **dict.fromkeys(("W124", "W125", "W129", "W138", "W140", "W143", "M113", "M120", "M209", "M214"), _OTHER),
     **dict.fromkeys(("W145", "W160", "W161", "W216", "W260"), _IMAGE),
     **dict.fromkeys(("W146", "W209"), "the values of the row are the author's"),
-    **dict.fromkeys(("W201", "W202", "W203", "W205", "W210", "W218", "W219", "W221", "W225"), _WAY),
+    **dict.fromkeys(("W201", "W202", "W203", "W205", "W210", "W218", "W219", "W221", "W225", "W226"), _WAY),
     **dict.fromkeys(("W204", "M207"), "the code is needless, or the way to it is missing"),
     "W224": "which number is meant is the author's to say",
     "W213": "what is read instead depends on what it is for",

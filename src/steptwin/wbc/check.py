@@ -69,6 +69,7 @@ def check_program(
         diagnostics += flow.interrupt_ends(paths, executable)
         diagnostics += flow.unreached(paths, executable)
         diagnostics += flow.stray_returns(paths, executable)
+        diagnostics += flow.left_by_calls(paths, executable)
     if not wrong:
         diagnostics += mistaken.unused_variables(executable, resolution.scope, dialect)
         diagnostics += mistaken.waits_for_variables(executable, dialect)

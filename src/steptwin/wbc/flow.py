@@ -23,6 +23,9 @@ INTERRUPTED_LINE_IS_NOT_CONTINUED = Message("wbc.interrupted-line-is-not-continu
 THIS_LINE_IS_NEVER_REACHED = Message("wbc.this-line-is-never-reached", "this line is never reached")
 NO_LABEL_OR_INTERRUPT_LEADS_HERE = Message("wbc.no-label-or-interrupt-leads-here", "no label or interrupt leads here")
 
+JUMP_OUT_OF_A_LOOP = Message("wbc.jump-out-of-a-loop", "a JUMP out of a loop is a call: the next RETURN comes back into the loop")
+LEAVE_BY_ITS_CONDITION = Message("wbc.leave-by-its-condition", "give the condition of the WHILE another result")
+
 
 def flow_of(steps: tuple[s.ProgramStep, ...]) -> ControlFlow:
     return ControlFlow(
@@ -89,3 +92,19 @@ def stray_returns(flow: ControlFlow, executable: s.Executable) -> list[Diagnosti
     hint = END_THE_PROGRAM_ABOVE()
     strays = [steps[number] for number in flow.level(0) if number < len(steps)]
     return [f.STRAY_RETURN.at(step, RETURN_WITHOUT_A_JUMP(), hint) for step in strays if isinstance(step, s.ReturnStep)]
+
+
+def left_by_calls(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
+    """Each JUMP of a subroutine that would leave a loop under a condition, to what the loop itself goes on with."""
+    steps, found = executable.steps, list[Diagnostic]()
+    main = set(flow.level(0)) if steps else set()
+    loops = [(begin, step.close) for begin, step in enumerate(steps) if isinstance(step, s.WhileStep) and begin not in main]
+    branches = [(begin, step.close) for begin, step in enumerate(steps) if isinstance(step, s.IfStep)]
+    behind = {close: set(flow.level(close + 1)) for _, close in loops}
+    for number, step in enumerate(steps):
+        if not isinstance(step, s.JumpStep) or not flow.returns[step.target]:
+            continue
+        left = [(begin, close) for begin, close in loops if begin < number < close < step.target and step.target in behind[close]]
+        if any(begin < branch < number < end for begin, _ in left for branch, end in branches):
+            found.append(f.LEFT_BY_CALL.at(step, JUMP_OUT_OF_A_LOOP(), LEAVE_BY_ITS_CONDITION()))
+    return found
