@@ -53,7 +53,7 @@ class Attempts:
         found = found or self._all.controllers.unheard(controller, axis, until)
         found = (
             found
-            or self._all.programs.before(controller, axis, until)
+            or self._all.programs.before(controller, axis, until, Place(until, LAST, -2))
             or self._all.programs.made_in_vain(controller, axis, until)
         )
         if found is not None or not self._log.never_happened(f"event of axis {number}"):

@@ -12,7 +12,7 @@ from steptwin.datasheet import EventSeverity
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, along, covered, nothing, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, given, nothing, unknown
 from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.sentences import END_OF_PROGRAM, statement
@@ -131,15 +131,17 @@ class ProgramCauses:
         uses = [programs.use(StatementLocation(location.text, one)) for one in numbers if not any(one in of for of in others)]
         return any(wanted in use.writes and (level is None or use.sets != level) for use in uses)
 
-    def before(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
+    def before(self, controller: str, wanted: Resource, at: Nanos, place: Place | None = None) -> FoundCause:
         """Cause for which no statement has changed something by a moment: the program is held, has decided against it, or waits
-        before it; None if that is not known."""
+        before it, at a place; None if that is not known."""
         if controller not in self._world.programs or not self.is_written(controller, wanted):
             return None
         held = self.prevented(controller, wanted, at)
         index = self._log.last_executed(controller, at)
-        waits = held is None and index >= 0 and self.use(controller, index).waits
-        return self.waiting(controller, index) if waits and self.leads_to(controller, index, wanted, at) else held
+        is_held = self.stands(controller, at) is not None
+        waits = not is_held and index >= 0 and self.use(controller, index).waits
+        comes = waits and self.leads_to(controller, index, wanted, at)
+        return along(self.waiting(controller, index, place), [held]) if comes else held
 
     def made_in_vain(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
         """The last statement by a moment that would have changed something until what it waited for was there, which it was."""
@@ -152,13 +154,16 @@ class ProgramCauses:
         is_over = self.use(controller, index).waits and index < self._log.last_executed(controller, at)
         return covered(self._did_not_wait(controller, index), Cover.LEVEL) if is_over else None
 
-    def waiting(self, controller: str, index: int) -> Cause:
-        """A wait that is not over, and what it waits for."""
+    def waiting(self, controller: str, index: int, place: Place | None = None) -> Cause:
+        """A wait that is not over, and what it waits for, at a place; by default when it began."""
         found, here = self.statement(controller, index), self._log.executed[controller][index]
         text = WAITS(controller=controller, statement=statement(self._log, here))
-        besides = partial(self._unchanged, controller, index, found.place)
-        link = ChainLink(here.time, controller, text, is_stand=True)
-        return found._replace(link=link, cover=Cover.WAIT, besides=besides)
+        at = found.place if place is None else place
+        link = ChainLink(at.time, controller, text, is_stand=True)
+        besides = partial(self._unchanged, controller, index, at)
+        if place is None:
+            return found._replace(link=link, cover=Cover.WAIT, besides=besides)
+        return Cause(link, place, partial(given, covered(found, Cover.WAIT)), Cover.WAIT, besides)
 
     def prevented(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
         """Cause that holds a program at a moment, or the condition that decided against a statement that changes something; both
