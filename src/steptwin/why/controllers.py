@@ -523,12 +523,13 @@ class ControllerCauses:
         return self._all.programs.statement(controller, index)
 
     def _not_followed(self, controller: str, error: Change, wanted: Resource) -> FoundCause:
-        """Cause that kept an axis from its position since its motion began, or the command of that."""
+        """Cause that kept an axis from its position since its motion began, and the command of that."""
         commanded = self._earlier(controller, error.time, wanted)
         driven = [name for name, axis in self._world.axes.items() if axis.spec.drive == (controller, f"M{wanted.name}")]
         begun = -1 if commanded is None else commanded.place.time
         found: list[Cause] = [kept for name in driven if (kept := self._all.axes.kept(name, begun, error)) is not None]
-        return max(found, key=lambda one: one.place, default=commanded)
+        kept = max(found, key=lambda one: one.place, default=None)
+        return commanded if kept is None else along(kept, [covered(commanded, Cover.MOTION)])
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The motion of an axis that ended at a moment."""

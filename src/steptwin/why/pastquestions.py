@@ -117,8 +117,7 @@ class PastQuestions:
             else:
                 held_back += [one for one, stand in zip(others, programs, strict=True) if _decides(one, stand)][:1]
         masked = () if tried or held_back or not suspects else (yield from self._masking(suspects, answer))
-        if not (tried or held_back or masked or any(link.root for link in answer.links)):
-            tried = yield from self._deciding_acts(answer)
+        tried += yield from self._deciding_acts(answer, is_rootless=not (tried or held_back or masked))
         links = _between(_with(answer.links[len(lacking) :], (*tried, *held_back)), masked)
         answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *links))))
         if not try_without:
@@ -157,11 +156,15 @@ class PastQuestions:
             found[name] = yield from self._settled(lambda known, name=name: self._answer(known, name, answer.at))
         return [*found.values()]
 
-    def _deciding_acts(self, answer: Answer) -> Generator[None, None, list[Trial]]:
-        """The runs without each of the last acts of scripts and from outside, as far as something is so because of them."""
+    def _deciding_acts(self, answer: Answer, *, is_rootless: bool) -> Generator[None, None, list[Trial]]:
+        """The runs without each of the last acts of scripts and from outside, as far as something is so because of them: acts
+        after all causes, which cannot say why it still is; any, where the answer has no root."""
+        is_rootless &= not any(link.root for link in answer.links)
+        after = -1 if is_rootless else max((link.time for link in answer.links if link.time < answer.at), default=-1)
         there = yield from self._settled(lambda known: known.past.world_at(answer.at))
         since = answer.known_from if answer.since is None else answer.since
         acts = [one for one in there.acts if not is_release(one.script)]
+        acts = [one for one in acts if one.time > after]
         near = [one for one in acts if one.time >= since or answer.at - since >= STANDS_NS]
         found: list[Trial] = []
         for act in near[-MOST_SUSPECTS:]:

@@ -19,7 +19,7 @@ from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.attempts import NOTHING_HAS_COMMANDED
 from steptwin.why.causes import Causes
-from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered
+from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered, nothing
 from steptwin.why.controllers import axis_of
 from steptwin.why.interrupts import Missed
 from steptwin.why.log import LAST
@@ -270,7 +270,8 @@ class Why:
             if index < 0 and not waiting.is_filed:  # what it waits behind was before
                 self.log.lack()
             elif waiting.is_filed or programs.use(controller, index).waits:
-                ahead = None if waiting.is_filed else programs.held(controller, at) or programs.waiting(controller, index)
+                ahead = None if waiting.is_filed else programs.held(controller, at)
+                ahead = ahead or (None if waiting.is_filed else programs.waiting(controller, index, Place(at, LAST, -3)))
                 sent = self.causes.controllers.sent(controller, waiting.code, index + 1, at)
                 text = (IS_FILED if waiting.is_filed else IS_QUEUED)(command=waiting.code)
                 led = partial(along, sent, [ahead])
@@ -279,8 +280,13 @@ class Why:
 
     def _commanded(self, cause: FoundCause, queued: Sequence[Cause]) -> FoundCause:
         """A cause that an axis was not commanded to move, unless a command waits."""
-        is_none = cause is not None and cause.link.text.id == NOTHING_HAS_COMMANDED.id
-        return None if is_none and queued else cause
+        if cause is None or not queued:
+            return cause
+        if cause.link.text.id == NOTHING_HAS_COMMANDED.id:
+            return None
+        before = cause.before()
+        is_none = before is not None and before.link.text.id == NOTHING_HAS_COMMANDED.id
+        return cause._replace(before=nothing) if is_none else cause
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""

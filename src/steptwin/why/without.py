@@ -18,7 +18,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.why.answer import Answer, ChainLink, Effect, Trial
 from steptwin.why.notedpast import NotedPast
-from steptwin.why.question import Why
+from steptwin.why.question import NOTHING_EXECUTED, Why
 from steptwin.why.roots import Act, Root, Sent, SetFault
 from steptwin.why.search import Snapshots
 
@@ -69,7 +69,23 @@ def _trying(
     if link.root is None:
         raise Misuse(NOT_FOUND_AGAIN())
     roots = (link.root, *others)
-    state = snapshots.state_at(max(snapshots.begin, min(_began(snapshots, root) for root in roots) - 1))
+    begin = max(snapshots.begin, min(_began(snapshots, root) for root in roots) - 1)
+    found = yield from _trying_from(snapshots, begin, link, answers, most, around, roots)
+    if begin > snapshots.begin and any(one.text.id == NOTHING_EXECUTED.id for one in found):  # what it executed was before
+        found = yield from _trying_from(snapshots, snapshots.begin, link, answers, most, around, roots)
+    return found
+
+
+def _trying_from(
+    snapshots: SnapshotsWithInputs,
+    begin: Nanos,
+    link: ChainLink,
+    answers: Sequence[Answer],
+    most: int,
+    around: Nanos,
+    roots: Sequence[Root],
+) -> Trying:
+    state = snapshots.state_at(begin)
     if state.snapshot.now > min(root.time for root in roots):
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
     run = _RunWithout(snapshots.world, state.snapshot, roots)
