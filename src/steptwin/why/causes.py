@@ -29,7 +29,7 @@ from steptwin.why.interrupts import InterruptCauses
 from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
-from steptwin.why.roots import SetFault
+from steptwin.why.roots import Act, SetFault
 from steptwin.why.scripts import ScriptCauses, acted
 from steptwin.why.workpieces import IS_WIRED_TO, WorkpieceCauses
 
@@ -48,6 +48,8 @@ NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired"
 NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of its program sets")
 NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")
 NOBODY_PRESSED = Message("why.nobody-pressed", ", not pressed until then")
+PRESSED_BY = Message("why.pressed-by", ", pressed by script {script}")
+PRESSED_FROM_OUTSIDE = Message("why.pressed-from-outside", ", pressed from outside")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
 OF = Message("why.of", " of {pin}")
 NORMALLY_CLOSED = Message("why.normally-closed", ", a normally closed contact{how}")
@@ -120,8 +122,20 @@ class Causes:
             driven = self._driven_by(signal, drivers)
         elif since is None:
             driven = self.undriven(signal) or ""
-        how = self._as_it_is(signal, driven)
+        how = self._as_it_is(signal, driven or self._pressed(signal, at))
         return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=how)
+
+    def _pressed(self, signal: str, at: Nanos) -> MessageText | str:
+        """Who presses a button at a moment."""
+        button, contact = self._world.objects.built(BUTTON).get(signal), self.contacts.get(signal)
+        if button is None or contact is None or bool(self.log.level(signal, at)) is contact.normally_closed:
+            return ""
+        last = self.last((signal,), at)
+        by = None if last is None else last.before()
+        act = None if by is None else by.link.root
+        if not isinstance(act, Act):
+            return ""
+        return PRESSED_BY(script=act.by) if act.by else PRESSED_FROM_OUTSIDE()
 
     def _driven_by(self, signal: str, drivers: Sequence[str]) -> MessageText:
         driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers))

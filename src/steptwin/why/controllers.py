@@ -596,12 +596,23 @@ class ControllerCauses:
         members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
         meaning = self._log.frames.meaning(record)
         acts = [act for act in self._log.acts_before(record.time, order) if _requests(act, record.controller, members)]
-        act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
+        made = (act for act in acts if self._makes(act, record.data()))
+        others = (act for act in acts if not isinstance(act.what, do.Write))
+        act = next(made, None) or next((act for act in acts if _names(act, meaning)), None) or next(others, None)
         if act is None:
             self._log.lack()
             return None
         what = SENDS_TO(data=meaning, line=record.controller) if isinstance(act.what, do.Request) else None
         return covered(self._all.scripts.acted(act, what), Cover.FRAME)
+
+    def _makes(self, act: Act, frame: bytes) -> bool:
+        """Whether a frame carries one of the requests of an action."""
+        match act.what:
+            case do.Write() as what:
+                return any(pdu in frame for _, pdus in self._world.requests(what) for pdu in pdus)
+            case do.Request(pdu=pdu):
+                return pdu in frame
+        return False
 
     def _input(self, record: TraceRecord, order: int) -> Cause:
         act = next(self._log.acts_at(record.time, order), None)

@@ -15,6 +15,7 @@ from steptwin.why.chain import Cause, Place, covered, given
 from steptwin.why.sentences import statement_at
 
 OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
+OTHER_EDGE = Message("why.other-edge", "{edge}: {label} comes with the other edge")
 WHILE_OFF = Message("why.while-off", "{edge}, while {label} was off")
 OF_AWAITED_INTERRUPT = Message("why.of-awaited-interrupt", "{statement} is executed by {label}, which has not come")
 
@@ -122,6 +123,13 @@ class InterruptCauses:
         words = WHILE_OFF(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
         off = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
         return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *off))
+
+    def other_edge(self, controller: str, missed: Missed) -> Cause:
+        """A change of an input the other way than that with which an interrupt comes, and what has enabled that."""
+        edge = missed.edge
+        words = OTHER_EDGE(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
+        on = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
+        return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *on))
 
     def switched_by(self, controller: str, use: StatementUse, at: Nanos) -> Sequence[Cause]:
         """The last causes by a moment for which an interrupt is on or off."""

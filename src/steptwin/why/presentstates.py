@@ -260,7 +260,10 @@ class PresentStates:
         supply = programs.supply_off(owner, at)
         if supply is not None:
             return [supply]
-        if programs.stands(owner, at) is not None and not programs.may_write(owner, pin):
+        stands = programs.stands(owner, at)
+        if stands is not None and not programs.may_write(owner, pin):
+            if stands.place.order >= 0 and not self._world.programs[owner].texts:  # what it would go on with is not known
+                yield stands.link
             return ()
         waiting, wanted = self._log.last_executed(owner, at), Resource(ResourceKind.PIN, pin)
         comes = waiting < 0 or programs.leads_to(owner, waiting, wanted, at)

@@ -218,10 +218,13 @@ class Why:
         return [*off, *(yield from self._unnoticed(missed, other))]
 
     def _unnoticed(self, missed: Sequence[tuple[str, Missed]], other: Simulation) -> Generator[None, None, Sequence[Cause]]:
-        """The last change that each interrupt did not notice as it was off, and what has switched that on since. ``other``: a
+        """The last change that each interrupt did not notice as it was off or waited for the other edge, and what has switched it
+        on since. ``other``: a
         world in the state of the moment."""
         found: dict[tuple[str, StatementLocation], Sequence[Cause]] = {}
         levels: dict[tuple[str, StatementLocation], float | None] = {}
+        others: dict[tuple[str, StatementLocation], tuple[str, Missed]] = {}
+        """Changes the other way, of interrupts that have never come."""
         at = other.now
         for owner, one in missed:
             key, time = (owner, one.label), one.edge.place.time
@@ -229,13 +232,16 @@ class Why:
             if key not in levels:
                 levels[key] = yield from self._noticed(owner, one.use, switched, other)
             if key in found or levels[key] not in (None, self.log.level(one.signal, time)):
+                is_first = key not in others and not self.causes.interrupts.has_come(owner, one.label, at)
+                others |= {key: (owner, one)} if is_first else {}
                 continue
             came = min(at, time + self.causes.programs.filtering(owner, one.signal.partition(".")[2]))
             then = yield from self.past.world_at(came)
             if not _is_on(then, owner, one.use):
                 later = [cause for cause in switched if cause.place.time > came] if _is_on(other, owner, one.use) else []
                 found[key] = (self.causes.interrupts.unnoticed(owner, one), *later)
-        return [cause for causes in found.values() for cause in causes]
+        wrong = [self.causes.interrupts.other_edge(*one) for key, one in others.items() if key not in found]
+        return [*wrong, *(cause for causes in found.values() for cause in causes)]
 
     def _noticed(
         self, controller: str, use: StatementUse, switched: Sequence[Cause], other: Simulation
