@@ -317,6 +317,8 @@ class AxisCauses:
             return self.rotor_event(axis, event)._replace(along=tuple(one for one in others if one is not None))
         if is_unpowered and power is not None:
             let_go = self._let_go(axis, power, rests)
+            if 0 <= began < power.link.time and is_off:  # what is later of its motion moves nothing
+                motion = self.motion(controller, number, power.link.time, axis)
             in_vain = [] if motion is None else [motion._replace(cover=Cover.LEVEL)]
             off = let_go._replace(along=(*let_go.along, *in_vain))
             return off if is_off else self._regained(axis, let_go, power, motion)

@@ -191,7 +191,8 @@ class Why:
     def _again(self, signals: Sequence[str], since: Nanos | None, at: Nanos) -> Iterator[Cause]:
         """Events that began controllers anew, could have changed signals since, and have led to nothing."""
         for controller, wanted in self.past.changeable(signals, at):
-            found = self.causes.controllers.begun_in_vain(controller, wanted, since, at)
+            changed = self._changed_since(controller, wanted, since, at)
+            found = self.causes.controllers.begun_in_vain(controller, wanted, changed, at)
             if found is not None:
                 yield found
 
@@ -347,13 +348,13 @@ class Why:
         waiting = {*self.past.changeable([one for one in names if self._is_set(one) or self.causes.holding.depends([one])], at)}
         waiting |= set(self._kept(names, at))
         for controller, wanted in self.past.changeable(names, at):
-            index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
+            index, since = log.last_executed(controller, at), self._changed_since(controller, wanted, answer.since, at)
             if index < 0 and wanted.kind is ResourceKind.AXIS and log.world.programs[controller].texts:
                 log.lack()  # the program may have come to its end before
             is_over = (
                 wanted.kind is ResourceKind.AXIS and since is not None and index >= 0 and programs.is_over(controller, index, at)
             )
-            if index < 0 or not (is_over or programs.leads_to(controller, index, wanted, at)):
+            if index < 0 or not (is_over or programs.leads_to(controller, index, wanted, at)) or self._is_unpowered(names, at):
                 continue
             held = programs.held(controller, at) or programs.ended(controller, index, at)
             if is_over and held is None and programs.is_written(controller, wanted):
@@ -369,6 +370,12 @@ class Why:
                 if (since or 0) <= begun < at - log.world.programs[controller].statement_time:
                     found.setdefault(controller, False)
         return found
+
+    def _is_unpowered(self, names: Sequence[str], at: Nanos) -> bool:
+        """Whether all signals are those of axes without current: no program moves them."""
+        axes = [name.partition(".")[0] for name in names]
+        powers = [self.causes.axes.power_of(axis) if axis in self.world.axes else "" for axis in axes]
+        return bool(powers) and all(power and not self.log.level(power, at) for power in powers)
 
     def _kept(self, names: Sequence[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
         """The outputs whose last changes keep workpieces where signals are as they are because of them."""
@@ -388,10 +395,10 @@ class Why:
         is_output = owner in self.world.programs and pin in self.past.pins(name) and self.causes.programs.may_write(owner, pin)
         return is_output or self.names.variable(name) is not None
 
-    def _since(self, controller: str, wanted: Resource, answer: Answer) -> Nanos | None:
-        """Since when an answer is so, or an output that what it is about follows later."""
-        since = self.log.since(f"{controller}.{wanted.name}", answer.at) if wanted.kind is ResourceKind.PIN else None
-        return answer.since if since is None or answer.since is None else min(since, answer.since)
+    def _changed_since(self, controller: str, wanted: Resource, since: Nanos | None, at: Nanos) -> Nanos | None:
+        """Since when something is so at a moment, or an output that it follows later."""
+        changed = self.log.since(f"{controller}.{wanted.name}", at) if wanted.kind is ResourceKind.PIN else None
+        return since if changed is None or since is None else min(changed, since)
 
     def _of_variable(self, text: str, controller: str, name: str, at: Nanos) -> Asking:
         """The statement, or somebody, that wrote a variable last."""
