@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from pages import PAGES, ROOT, RUN, Reader, blocks, only
 
+from steptwin.simulation.describe.includes import no_files
+from steptwin.simulation.world.check import diagnose
 from steptwin.wbc.check import check
 
 WITH_CODE = [page for page in PAGES if any(block.is_done for block in blocks(page))]
@@ -84,6 +86,14 @@ def test_programs_on_pages_have_no_findings() -> None:
     programs = [block for page in PAGES for block in blocks(page) if block.language == "wbc"]
     assert len(programs) > 1
     assert [(block.page, found.message) for block in programs for found in check(block.code).diagnostics] == []
+
+
+def test_worlds_on_pages_have_no_findings() -> None:
+    """Those that are whole and name no files."""
+    toml = [block for page in PAGES for block in blocks(page) if block.language == "toml" and block.reason is None]
+    worlds = [block for block in toml if "[[mic488]]" in block.code and not re.search(r"^program = ", block.code, re.MULTILINE)]
+    assert len(worlds) > 10
+    assert [(one.page, found.message) for one in worlds for found in diagnose(one.page, one.code, no_files).findings] == []
 
 
 def test_pages_name_the_command_that_prints_what_only_the_built_page_has() -> None:
