@@ -36,5 +36,5 @@ class M1486Spec(ControllerSpec):
     baud: int | None = key(whole(300, 1_000_000), "bit/s; default the highest", default=None)
     statement_time: Nanos | None = key(time_value, "what a command takes; default 1 ms", default=None)
     program: str | None = key(
-        text_value, "a program it is switched on with; types with RAM lose it when they are switched off", default=None
+        text_value, "file with a program it is switched on with; types with RAM lose it when they are switched off", default=None
     )

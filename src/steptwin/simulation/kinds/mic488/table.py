@@ -88,7 +88,7 @@ class Mic488Spec(ControllerSpec):
     unit: int | None = key(whole(1, MAX_UNIT), "slave address; default that of its configuration", default=None)
     firmware: str = key(_firmware, "its firmware", default="1.70")
     config: str | None = key(text_value, "the vendor tool's .cfg file", default=None)
-    program: str | None = key(text_value, "a WBC program for bank 0", default=None)
+    program: str | None = key(text_value, "file with a WBC program for bank 0", default=None)
     programs: BankFiles = key(
         banks_value,
         "WBC programs by bank: ['a.prg', 'b.prg'] for 0 and 1, or { 3 = 'd.prg' }",
