@@ -237,6 +237,16 @@ def test_faults_stand_at_what_they_are_set_on_at_once() -> None:
     assert found == {"cell.IN3": "cell.IN3", "cup": "cup.held", "": None, "cell.M1": "cell.M1.status"}
 
 
+def test_a_fault_that_is_over_stands_no_more() -> None:
+    world = World.from_toml(CELL)
+    subject = WorldSubject(world)
+    subject.do(do.SetFault(read("stuck pin=IN3 value=1 until_s=2")))
+    world.run(for_=1.5)
+    assert [one.name for one in standing(subject, StandingKind.FAULT)] == ["cell.IN3"]
+    world.run(for_=1.0)
+    assert not [*standing(subject, StandingKind.FAULT)]
+
+
 def test_what_was_later_than_now_has_not_happened() -> None:
     """After a return the moment of a change that is undone is not known, and not that of what is undone."""
     world = World.from_toml(CELL)

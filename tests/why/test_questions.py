@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 from unittest.mock import patch
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.files.world import World
@@ -146,6 +146,7 @@ def test_each_root_is_proved(name: str, question: str, at: float | None) -> None
         assert trial.effect is not Effect.UNKNOWN, trial
 
 
+@example(("interrupts that were switched off after they had come", "OUT4", None), 0.13, False)
 @given(st.sampled_from(ASKED), st.sampled_from([0.05, 0.2, 0.7, 1.0, 2.0]), st.booleans())
 @settings(max_examples=30)
 def test_an_answer_does_not_depend_on_what_is_searched_first(asked: Asked, span: float, everything: bool) -> None:

@@ -195,7 +195,7 @@ class Standing:
 
     def _faults(self) -> Iterator[StandingState]:
         for fault in self._world.objects.faults.active:
-            if fault.begin > self._world.now:
+            if fault.begin > self._world.now or (fault.end is not None and fault.end <= self._world.now):
                 continue
             name = place_of(self._world, fault)
             question: str | None = None

@@ -5,6 +5,8 @@ JUMP is a call: it remembers the next line, which is reached when the code at th
 
 from __future__ import annotations
 
+from functools import cache
+
 from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import Diagnostic
 from steptwin.messages import Message
@@ -100,11 +102,11 @@ def left_by_calls(flow: ControlFlow, executable: s.Executable) -> list[Diagnosti
     main = set(flow.level(0)) if steps else set()
     loops = [(begin, step.close) for begin, step in enumerate(steps) if isinstance(step, s.WhileStep) and begin not in main]
     branches = [(begin, step.close) for begin, step in enumerate(steps) if isinstance(step, s.IfStep)]
-    behind = {close: set(flow.level(close + 1)) for _, close in loops}
+    behind = cache(lambda close: set(flow.level(close + 1)))
     for number, step in enumerate(steps):
         if not isinstance(step, s.JumpStep) or not flow.returns[step.target]:
             continue
-        left = [(begin, close) for begin, close in loops if begin < number < close < step.target and step.target in behind[close]]
+        left = [(begin, close) for begin, close in loops if begin < number < close < step.target and step.target in behind(close)]
         if any(begin < branch < number < end for begin, _ in left for branch, end in branches):
             found.append(f.LEFT_BY_CALL.at(step, JUMP_OUT_OF_A_LOOP(), LEAVE_BY_ITS_CONDITION()))
     return found

@@ -248,14 +248,21 @@ class Causes:
         return None
 
     def _bounce_of(self, signal: str, change: Change) -> Change:
-        """The change of a contact with which it began to bounce; the change itself, where it does not bounce then."""
+        """The change of a contact with which it began to bounce, and at whose level it comes to rest; the change itself, where it
+        does not bounce then."""
         longest = self.contacts[signal].bounce_ns if signal in self.contacts else 0
         first = change
-        while longest and (earlier := self.log.last_change(signal, first.time - 1)) is not None:
-            if change.time - earlier.time > longest or self.log.is_first(signal, earlier):
+        while longest and not self._is_pressed_at(signal, first):
+            earlier = self.log.last_change(signal, first.time - 1)
+            if earlier is None or change.time - earlier.time > longest or self.log.is_first(signal, earlier):
                 break
             first = earlier
-        return first
+        return first if self.log.level(signal, first.time + longest) == first.value else change
+
+    def _is_pressed_at(self, button: str, change: Change) -> bool:
+        """Whether somebody presses or releases a button at a change."""
+        acts = self.log.acts_at(change.time, change.order)
+        return any(isinstance(act.what, do.Press | do.Release) and act.what.button == button for act in acts)
 
     def _cleared(self, signal: str, change: Change) -> FoundCause:
         """The action at the moment of a change that cleared the fault which had held a signal."""

@@ -201,10 +201,12 @@ class Chain:
         """Let causes wait that lead to something. ``is_owed``: one more should have been found."""
         rules = [broken(one, place) for one in causes]
         self._waiting += [_Waiting(distance, one, leads) for one, rule in zip(causes, rules, strict=True) if rule is None]
+        if not leads and self._is_full:  # it is not shown
+            return
         is_rootless = is_owed and self._is_whole(effect.time)
         self.is_cut |= is_owed and not is_rootless
         rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_rootless else None)
-        if rule is not None and (leads or not self._is_full):
+        if rule is not None:
             self.broken = self.broken or rule
             self._taken[place._replace(number=place.number - 1), replace(effect, text=NOT_KNOWN(), root=None)] = None
 

@@ -117,19 +117,13 @@ class InterruptCauses:
                     yield Missed(use, label, f"{controller}.{pin.name}", edge)
                     edge = programs.resource(controller, pin, index, edge.place.time, edge.place.order)
 
-    def unnoticed(self, controller: str, missed: Missed) -> Cause:
-        """A change of an input while its interrupt was off, with what had switched that off."""
+    def unnoticed(self, controller: str, missed: Missed, how: Message = WHILE_OFF) -> Cause:
+        """A change of an input while its interrupt was off, or, with `OTHER_EDGE`, the other way than that with which it comes;
+        along with what had switched that."""
         edge = missed.edge
-        words = WHILE_OFF(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
-        off = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
-        return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *off))
-
-    def other_edge(self, controller: str, missed: Missed) -> Cause:
-        """A change of an input the other way than that with which an interrupt comes, and what has enabled that."""
-        edge = missed.edge
-        words = OTHER_EDGE(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
-        on = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
-        return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *on))
+        words = how(edge=edge.link.text, label=statement_at(self._world.programs[controller], missed.label))
+        by = [one for one in self.switched_by(controller, missed.use, edge.place.time) if one.place < edge.place]
+        return edge._replace(link=replace(edge.link, text=words), cover=Cover.LEVEL, besides=lambda: (*edge.besides(), *by))
 
     def switched_by(self, controller: str, use: StatementUse, at: Nanos) -> Sequence[Cause]:
         """The last causes by a moment for which an interrupt is on or off."""

@@ -41,6 +41,8 @@ STANDS_NS: Nanos = SECOND
 """Time after which a state may be because of any fault that has acted before, whatever it would be a moment earlier or later."""
 MOST_SUSPECTS = 4
 """Limit of the faults that are tried for one question, the last ones first."""
+LONGEST_TRIED_NS: Nanos = 300 * SECOND
+"""Longest time that is run again without the last actions."""
 WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")
 WITHOUT_THEM = Message("why.without-them", "{what}; without it and {others}: {state}")
 MOST_NOTED = 500_000
@@ -158,17 +160,20 @@ class PastQuestions:
 
     def _deciding_acts(self, answer: Answer, *, is_rootless: bool) -> Generator[None, None, list[Trial]]:
         """The runs without each of the last acts of scripts and from outside, as far as something is so because of them: acts
-        after all causes, which cannot say why it still is; any, where the answer has no root."""
-        is_rootless &= not any(link.root for link in answer.links)
+        after all causes, which cannot say why it still is; any, where a whole chain has no root, unless nothing drives it."""
+        is_rootless &= answer.is_complete and not any(link.root for link in answer.links)
+        if is_rootless and self._logs[0].why.is_undriven(answer.question):
+            return []
         after = -1 if is_rootless else max((link.time for link in answer.links if link.time < answer.at), default=-1)
         there = yield from self._settled(lambda known: known.past.world_at(answer.at))
         since = answer.known_from if answer.since is None else answer.since
-        acts = [one for one in there.acts if not is_release(one.script)]
-        acts = [one for one in acts if one.time > after]
+        roots = [link.root[:3] for link in answer.links if isinstance(link.root, Act)]
+        acts = [one for one in there.acts if one.time > after and one not in roots and not is_release(one.script)]
         near = [one for one in acts if one.time >= since or answer.at - since >= STANDS_NS]
+        near = [one for one in near if answer.at - one.time <= LONGEST_TRIED_NS][-MOST_SUSPECTS:]
         found: list[Trial] = []
-        for act in near[-MOST_SUSPECTS:]:
-            link = acted(Act(*act, LAST, act.script)).link
+        for one in near:
+            link = acted(Act(one.time, one.script, one.what, order=LAST, by=one.script)).link
             (trial,) = yield from self._trying(link, (answer,))
             found += [trial] if _decides(trial, answer) else []
         return found
@@ -202,7 +207,9 @@ class PastQuestions:
         faults = {link.root.name: link for link in answer.links if isinstance(link.root, SetFault)}
         log, at = self._logs[0].past.log, answer.at
         active = (one for one in log.world.objects.faults.active if one.begin <= at and (one.end is None or at < one.end))
-        others = {*log.holding(at), *(one.name for one in active if one.name not in log.world.objects.faults.acts)}
+        acts = log.world.objects.faults.acts
+        idle = (one.name for one in active if one.name not in acts or acts[one.name].first > at)
+        others = {*log.holding(at), *idle}
         suspects = [*suspects, *sorted(others - {*faults, *suspects})[:MOST_SUSPECTS]]
         for name in suspects:
             faults[name] = yield from self._settled(

@@ -659,7 +659,7 @@ class ProgramCauses:
             return Cause(link, place, self._all.at_begin, Cover.LEVEL, partial(self._holding, controller, change))
         where = ""
         index = self._log.last_executed(controller, change.time)
-        if change.state is not ProgramState.STOPPED and index >= 0 and not self._was_over(controller, index, change.time):
+        if change.state is not ProgramState.STOPPED and index >= 0 and not self._may_be_over(controller, index, change.time):
             where = WHERE(statement=statement(self._log, self._log.executed[controller][index]))
         text = HELD[change.state](where=where)
         if change.state is ProgramState.STOPPED and index >= 0 and self._is_end(controller, index, change):
@@ -668,7 +668,7 @@ class ProgramCauses:
         by = partial(self._all.controllers.of_program, controller, change)
         return Cause(link, Place(change.time, change.order), by, Cover.LEVEL, partial(self._holding, controller, change))
 
-    def _was_over(self, controller: str, index: int, at: Nanos) -> bool:
+    def _may_be_over(self, controller: str, index: int, at: Nanos) -> bool:
         """Whether a program may have been over by a moment, with no motion of its last command going on."""
         is_last = self._log.executed[controller].locations[index].number < 0 or self.is_last(controller, index)
         return is_last and not (_moves(self.use(controller, index)) and self._all.axes.is_moving(controller, "", at))

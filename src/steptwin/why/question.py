@@ -21,7 +21,7 @@ from steptwin.why.attempts import NOTHING_HAS_COMMANDED
 from steptwin.why.causes import Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered, nothing
 from steptwin.why.controllers import axis_of
-from steptwin.why.interrupts import Missed
+from steptwin.why.interrupts import OTHER_EDGE, Missed
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast, text_of_question, without_not
 from steptwin.why.presentstates import IS_IN_A_LOOP, PresentStates
@@ -219,13 +219,11 @@ class Why:
         return [*off, *(yield from self._unnoticed(missed, other))]
 
     def _unnoticed(self, missed: Sequence[tuple[str, Missed]], other: Simulation) -> Generator[None, None, Sequence[Cause]]:
-        """The last change that each interrupt did not notice as it was off or waited for the other edge, and what has switched it
-        on since. ``other``: a
-        world in the state of the moment."""
+        """The last change that each interrupt did not notice, as it was off or waits for the other edge, and what has switched it
+        on since. ``other``: a world in the state of the moment."""
         found: dict[tuple[str, StatementLocation], Sequence[Cause]] = {}
         levels: dict[tuple[str, StatementLocation], float | None] = {}
-        others: dict[tuple[str, StatementLocation], tuple[str, Missed]] = {}
-        """Changes the other way, of interrupts that have never come."""
+        others: dict[tuple[str, StatementLocation], tuple[str, Missed]] = {}  # changes the other way, of those that never came
         at = other.now
         for owner, one in missed:
             key, time = (owner, one.label), one.edge.place.time
@@ -241,7 +239,7 @@ class Why:
             if not _is_on(then, owner, one.use):
                 later = [cause for cause in switched if cause.place.time > came] if _is_on(other, owner, one.use) else []
                 found[key] = (self.causes.interrupts.unnoticed(owner, one), *later)
-        wrong = [self.causes.interrupts.other_edge(*one) for key, one in others.items() if key not in found]
+        wrong = [self.causes.interrupts.unnoticed(*one, OTHER_EDGE) for key, one in others.items() if key not in found]
         return [*wrong, *(cause for causes in found.values() for cause in causes)]
 
     def _noticed(
@@ -251,6 +249,9 @@ class Why:
         where that was off, too; None where it may be either."""
         levels = dict(use.edges)
         for time in (other.now, *(cause.place.time - 1 for cause in switched if cause.place.time)) if levels else ():
+            if time < self.log.begin:
+                self.log.lack()
+                return None
             world = other if time == other.now else (yield from self.past.world_at(time))
             value = next((world.programs[controller].read(one.name, time) for one in use.acts_by), None)
             if value in levels:
@@ -370,6 +371,13 @@ class Why:
                 if (since or 0) <= begun < at - log.world.programs[controller].statement_time:
                     found.setdefault(controller, False)
         return found
+
+    def is_undriven(self, question: str) -> bool:
+        """Whether a question is about signals that nothing can change but from outside."""
+        text = text_of_question(question)
+        if self.names.is_script(text) or without_not(text) in self.world.controllers:
+            return False
+        return all(self.causes.undriven(name) is not None for name in self.past.names_in(text))
 
     def _is_unpowered(self, names: Sequence[str], at: Nanos) -> bool:
         """Whether all signals are those of axes without current: no program moves them."""
@@ -577,7 +585,7 @@ class Why:
         other = yield from self.past.world_at(at)
         waiting = next((one.waiting for one in other.scripts if one.name == name), None)
         if waiting is None or not waiting.condition:
-            return Answer(name, at, SCRIPT_DOES_NOT_WAIT(name=name, at=at / SECOND), None, (), is_complete=True)
+            raise Misuse(SCRIPT_DOES_NOT_WAIT(name=name, at=at / SECOND))
         answer = yield from self._condition(waiting.condition, at)
         return answer._replace(question=name, state=SCRIPT_WAITS(name=name, condition=waiting.condition))
 

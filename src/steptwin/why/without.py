@@ -18,7 +18,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.why.answer import Answer, ChainLink, Effect, Trial
 from steptwin.why.notedpast import NotedPast
-from steptwin.why.question import NOTHING_EXECUTED, Why
+from steptwin.why.question import NOTHING_EXECUTED, SCRIPT_DOES_NOT_WAIT, Asking, Why
 from steptwin.why.roots import Act, Root, Sent, SetFault
 from steptwin.why.search import Snapshots
 
@@ -95,11 +95,22 @@ def _trying_from(
     found: list[Trial] = []
     for answer in answers:
         wide = around if answer is answers[0] else 0
-        then = yield from other.asking(answer.question, answer.at + wide)
+        then = yield from _asking(other, answer.question, answer.at + wide)
         if not run.is_without:
             raise Misuse(NOT_FOUND_AGAIN())
         found.append(_compared(link, answer, then, state.snapshot.now, wide))
     return found
+
+
+def _asking(other: Why, question: str, at: Nanos) -> Asking:
+    """The answer in a run; about a script that waits for nothing then, just that."""
+    try:
+        return (yield from other.asking(question, at))
+    except Misuse as error:
+        text = text_of(error)
+        if getattr(text, "id", None) != SCRIPT_DOES_NOT_WAIT.id:
+            raise
+        return Answer(question, at, text, None, (), is_complete=True)
 
 
 def _compared(link: ChainLink, answer: Answer, other: Answer, begin: Nanos, around: Nanos) -> Trial:

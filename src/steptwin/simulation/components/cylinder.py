@@ -253,7 +253,8 @@ def _stands(cylinder: Cylinder, now: Nanos) -> Stands | None:
     if travel.grid_position(now) == end or travel.direction == wanted:
         return None
     text = (DOES_NOT_EXTEND if wanted > 0 else DOES_NOT_RETRACT)(place=round(cylinder.position(now), 3))
-    return Stands(STANDS_AGAINST(text=text, names=cylinder.blockers) if cylinder.blockers else text, travel.since)
+    text = STANDS_AGAINST(text=text, names=cylinder.blockers) if cylinder.blockers else text
+    return Stands(text, travel.since, signal="position")
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:

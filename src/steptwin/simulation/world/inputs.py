@@ -86,7 +86,7 @@ class PastAct(NamedTuple):
 MOST_ACTS = 8
 """Number of the last actions that a world remembers."""
 NO_ACTS = (Bytes, Refused, Leave, do.Expect, do.Note, do.SetFault, do.ClearFault)
-"""Inputs that are not among them: they change nothing, or are noted elsewhere."""
+"""Inputs that are not among them: they change nothing, are too many (`Bytes`), or noted elsewhere (faults)."""
 
 
 def size_of(what: ExternalInput) -> int:

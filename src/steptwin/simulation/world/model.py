@@ -75,7 +75,7 @@ class Model:
         """Things for which scripts waited in vain: conditions and answers until their time-out, writes that were
         refused."""
         self.until_subscribers: list[Callable[[str, str], None]] = []
-        """Called when a condition has come for which a script waited, with the name of the script and the condition."""
+        """Called when a condition has become true for which a script waited, with the name of the script and the condition."""
         self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
         others."""

@@ -31,6 +31,8 @@ class ScriptWait(NamedTuple):
     """The answer of a `Request` that was answered at once."""
     is_request: bool = False
     """Whether the answer is sent to the script's generator."""
+    began: Nanos = 0
+    """When a wait for a condition began."""
 
     @property
     def is_timed(self) -> bool:

@@ -254,7 +254,7 @@ class Scripts:
             value = self._answer(waiting) if has_come else None
         if has_come or (waiting.until is not None and waiting.until <= now):
             self._report_overdue(script, waiting, has_come=has_come)
-            if waiting.condition is not None and has_come:
+            if waiting.condition is not None and has_come and waiting.began < now:
                 for subscriber in self._model.until_subscribers:
                     subscriber(script.name, waiting.condition)
             self._resume(script, value)
@@ -321,7 +321,8 @@ class Scripts:
         return (ScriptWait(step.time) if step.time > self._model.now else None), None
 
     def _wait_for_condition(self, step: do.Until, script: Script) -> StepResult:
-        return ScriptWait(None if step.within is None else self._model.now + step.within, step.condition), None
+        now = self._model.now
+        return ScriptWait(None if step.within is None else now + step.within, step.condition, began=now), None
 
     def _order(self, step: do.Order, script: Script) -> StepResult:
         try:
@@ -333,7 +334,8 @@ class Scripts:
 
     def _wait_for_end(self, step: do.UntilOver, script: Script) -> StepResult:
         over = motion_ends(self._model, step.controller, step.axis).over
-        return ScriptWait(None if step.within is None else self._model.now + step.within, over), None
+        now = self._model.now
+        return ScriptWait(None if step.within is None else now + step.within, over, began=now), None
 
     def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
         self._do(script, do.Expect(motion_ends(self._model, step.controller, step.axis, step.seek).reached))
