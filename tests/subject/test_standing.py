@@ -11,6 +11,7 @@ from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Enable, Halt, Home, Move
+from steptwin.simulation.world.inputs import Download
 from steptwin.subject.standing import StandingKind, StandingState
 from steptwin.subject.world import WorldSubject
 
@@ -260,3 +261,52 @@ def test_what_was_later_than_now_has_not_happened() -> None:
     subject.go_back(there, None)
     (one,) = standing(subject, StandingKind.ELEMENT)
     assert one.since_ns is None or one.since_ns <= world.now
+
+
+POLLS = """
+OUT1 = ON
+OUT1 = OFF
+n = 0
+MAIN:
+n = n + 1
+DELAY 0.1
+IF IN1 = ON
+OUT2 = ON
+ENDIF
+JUMP MAIN
+"""
+CALCULATES = "n = 0\nMAIN:\nn = n + 1\nDELAY 0.05\nJUMP MAIN\n"
+
+
+def idle(subject: WorldSubject) -> list[tuple[str, Nanos | None]]:
+    return [(str(one.text), one.since_ns) for one in standing(subject, StandingKind.PROGRAM)]
+
+
+def test_a_program_that_only_asks_and_calculates_says_what_it_did_last() -> None:
+    world = World.from_toml(
+        '[world]\nname = "w"\n[[mic488]]\nname = "c"\nprogram = "p.prg"\nstart = true\n', {"p.prg": POLLS.encode()}
+    )
+    subject = WorldSubject(world)
+    subject.standing()
+    world.run(for_=0.5)
+    assert not idle(subject)
+    world.run(for_=1.5)
+    last = "executes statements, and has switched and moved nothing since line 3: OUT1 = OFF"
+    assert idle(subject) == [(last, 2 * MILLISECOND)]
+    subject.do(do.Set((("c", "IN1", 1.0),)))
+    world.run(for_=1.5)
+    assert not idle(subject)  # it switches OUT2 on again and again
+
+
+def test_what_another_program_did_is_not_said_of_this_one() -> None:
+    world = World.from_toml(
+        '[world]\nname = "w"\n[[mic488]]\nname = "c"\nprogram = "p.prg"\nstart = true\n', {"p.prg": POLLS.encode()}
+    )
+    subject = WorldSubject(world)
+    subject.standing()
+    world.run(for_=1.0)
+    subject.do(do.Write((("c", "PROGRAM_CTRL", 0),)))
+    subject.do(Download("c", "program 0", CALCULATES))
+    subject.do(do.Write((("c", "PROGRAM_CTRL", 1),)))
+    world.run(for_=2.0)
+    assert idle(subject) == [("executes statements, and has switched and moved nothing", None)]

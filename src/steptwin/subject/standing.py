@@ -10,6 +10,7 @@ from typing import Annotated
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ProgramActivity, StatusLevel
+from steptwin.diagnostics import visible
 from steptwin.jsonvalues import Moment, Sentence
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.axis import LOST, BuiltAxis, is_beside
@@ -21,6 +22,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.unfinished import StandingProgram, StandingPrograms
 from steptwin.simulation.world.wiring import connections
+from steptwin.subject.lastacts import LastActs
 
 LEAST_NS: Nanos = SECOND
 """Least time that something has stood when it is reported: less, and it may be on its way."""
@@ -54,6 +56,10 @@ WAITS_AT = Message("subject.waits-at", "waits at line {line}: {statement}")
 ALARM_WITH_PROGRAM = Message("subject.alarm-with-program", "{status}; the program is {program}")
 FAULT_IS_SET = Message("subject.fault-is-set", "fault {fault}")
 WITH_LEVELS = Message("subject.waits-with-levels", "{text} ({levels:; })")
+IDLE = Message("subject.idle", "executes statements, and has switched and moved nothing")
+IDLE_SINCE = Message(
+    "subject.idle-since", "executes statements, and has switched and moved nothing since line {line}: {statement}"
+)
 PAUSED_AT = Message("subject.paused-at", "is paused at line {line}: {statement}")
 ALARM_AT = Message("subject.alarm-at", "{status}, at line {line}: {statement}")
 
@@ -78,6 +84,7 @@ class Standing:
     def __init__(self, world: Simulation) -> None:
         self._world = world
         self._programs = StandingPrograms(world)
+        self._acts = LastActs(world)
         self._changed: dict[str, Nanos] = {}
         """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event; by an
         ``[[axis]]`` when it began or ended to lose pulses."""
@@ -107,13 +114,32 @@ class Standing:
         """Time has gone back to now: what came then and later has not happened."""
         self._changed = {name: moment for name, moment in self._changed.items() if moment < self._world.now}
         self._homed = {name: homed for name, homed in self._homed.items() if homed[0] < self._world.now}
+        self._acts.went_back(self._world.now)
 
     def states(self) -> Iterator[StandingState]:
         """Those of now: first what is wrong, then what waits."""
         now = self._world.now
         programs = {one.controller: one for one in self._programs}
         found = [*self._faults(), *self._controllers(now, programs), *self._elements(now), *_waiting(programs.values())]
+        found += self._idle(now, programs)
         return (one for one in found if one.since_ns is None or now - one.since_ns >= LEAST_NS or one.kind is StandingKind.FAULT)
+
+    def _idle(self, now: Nanos, standing: Mapping[str, StandingProgram]) -> Iterator[StandingState]:
+        """Programs that execute statements, and have switched and moved nothing since some time: most go round in a loop that
+        asks for something, perhaps with a DELAY. Which statement that is now would be another one each time."""
+        for name, programs in self._world.programs.items():
+            one = standing.get(name)
+            waits = one is not None and (one.use.reads or one.stand.since is None or now - one.stand.since >= LEAST_NS)
+            if programs.state is not ProgramState.RUNS or waits or not programs.stack(now):
+                continue
+            acted = self._acts.last(name)
+            if acted is not None:
+                since, (place, number) = acted
+                statement, text = programs.statements(place)[number], programs.texts[place].text
+                words = visible(text[statement.start : statement.end].strip())
+                yield StandingState(StandingKind.PROGRAM, name, IDLE_SINCE(line=statement.line, statement=words), since, name)
+            elif now - self._acts.begin >= LEAST_NS:
+                yield StandingState(StandingKind.PROGRAM, name, IDLE(), None, name)
 
     # ------------------------------------------------------------------ controllers
 
