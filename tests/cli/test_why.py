@@ -46,9 +46,9 @@ def test_the_run_again_without_a_root(session: str) -> None:
 
 
 def test_more_causes_than_are_shown(session: str) -> None:
-    asked = "why", session, "cell", "--at", "3s"
+    asked = "why", session, "cell", "--at", "2.9s"
     first, everything = (invoke(*asked, *more).splitlines() for more in ((), ("--all",)))
-    assert first[-1].strip() == "(further present states and causes are not shown: --all shows more)"
+    assert first[-1].strip() == "(further present states are not shown: --all shows more)"
     assert set(first[:-1]) < set(everything)
 
 

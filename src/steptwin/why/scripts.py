@@ -9,7 +9,7 @@ from steptwin.messages import Message, MessageText
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, given, nothing
+from steptwin.why.chain import Cause, Place, covered, given, nothing
 from steptwin.why.log import EndedWait
 from steptwin.why.names import QuestionNames
 from steptwin.why.roots import Act
@@ -20,6 +20,10 @@ FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
 SCRIPT_WENT_ON = Message("why.script-went-on", "script {name} went on, as {condition} became true")
 
 
+OF_DEVICES = (do.Set, do.Write, do.Send, do.Request)
+"""Actions of scripts that stand for a device, such as a PLC. What a person does, or a test that sets faults, is from outside."""
+
+
 class ScriptCauses:
     """Finds why scripts have acted. ``causes`` has the causes of everything else."""
 
@@ -28,27 +32,27 @@ class ScriptCauses:
         self._names = QuestionNames(causes.log)
 
     def acted(self, act: Act, what: MessageText | None = None) -> Cause:
-        """An action, which follows what its script waited for last. Where faults are set and cleared that is of the test, not of
-        the machine. ``what``: as that of the function."""
+        """An action, which follows what its script waited for last, if it is one of `OF_DEVICES`. ``what``: as that of the
+        function."""
         cause = acted(act, what)
-        ended = None if act.fault or isinstance(act.what, do.ClearFault) else self._wait_before(act)
-        return cause if ended is None else cause._replace(before=partial(given, ended))
-
-    def _wait_before(self, act: Act) -> FoundCause:
-        """The last wait of its script that something has ended."""
-        for wait in self._all.log.waits_before(act.by, act.time, act.order):
-            changed = self._changed(wait)
-            if changed is not None and changed.place < (wait.time, wait.order, 0):
-                text = SCRIPT_WENT_ON(name=act.by, condition=wait.condition)
-                link, place = ChainLink(wait.time, act.by, text), Place(wait.time, wait.order)
-                return Cause(link, place, partial(given, changed), Cover.WAIT)
-        if self._waits(act.by):
+        if not isinstance(act.what, OF_DEVICES):
+            return cause
+        wait = next(self._all.log.waits_before(act.by, act.time, act.order), None)
+        if wait is None and self._waits(act.by):
             self._all.log.lack()
-        return None
+        # It is followed when the chain comes to it: some scripts wait for what they have done themselves.
+        return cause if wait is None else cause._replace(before=partial(self._went_on, wait, act.by))
 
-    def _changed(self, wait: EndedWait) -> FoundCause:
+    def _went_on(self, wait: EndedWait, script: str) -> Cause:
+        """The end of a wait, and what made its condition true."""
+        place = Place(wait.time, wait.order)
         names = [self._names.canonical(name) for name in dict.fromkeys(parse_condition(wait.condition).names())]
-        return self._all.changes.of(names, wait.time)
+        changed = self._all.changes.of(names, wait.time)
+        if changed is not None and changed.link.time < wait.time:
+            changed = covered(changed, changed.cover or Cover.MOTION)
+        before = nothing if changed is None or changed.place >= place else partial(given, changed)
+        text = SCRIPT_WENT_ON(name=script, condition=wait.condition)
+        return Cause(ChainLink(wait.time, script, text), place, before, Cover.WAIT)
 
     def _waits(self, script: str) -> bool:
         """Whether a script of the description waits for a condition."""
