@@ -156,6 +156,8 @@ class InterruptCauses:
                 found = programs.resource(controller, one, index, found.place.time, found.place.order)
             if found is not None:
                 yield found._replace(cover=Cover.LEVEL)
+            elif one.kind is ResourceKind.PIN and self._log.since(f"{controller}.{one.name}", place.time) is None:
+                yield programs.first(controller, one)._replace(cover=Cover.LEVEL)  # its filter lets it in at the beginning
 
     def _noticed(self, controller: str, use: StatementUse, place: Place) -> float | None:
         """The level that a pin had to take so that an interrupt came; None where it may be either, or is not known."""
